@@ -8,12 +8,12 @@ The error x of the sensor is counted as
     alpha, beta, phi, theta    x = 2 sin((reading - truth) / 2): by so much the angle turns a unit vector
     airspeed                   x = reading / truth - 1
 
-Of each hypothesis h the record holds, for test j and filter pole m,
+For each hypothesis h, test j and filter pole m the record holds
 
     H    bound on |effect on residual j in one sample| / |x|
     H_m  the same through the filter, H_m <- decay_m H_m + H
-    C    lower bound, with sign, on the effect of a unit of x in one sample, on the tests of a row of EVIDENCE
-         together, complex if of two parts at right angles; C_m the same through the filter
+    C    lower bound, with sign, on the effect of a unit of x in one sample on the tests of a row of EVIDENCE
+         together; complex if the effect has two parts at right angles. C_m: the same through the filter
     E    bound on |x|. At the first sample it is as large as an aircraft can fly (E_start). Then, at each
          sample,
              E <- min(E + (1 - decay_slow) d, E_start)
@@ -21,7 +21,8 @@ Of each hypothesis h the record holds, for test j and filter pole m,
              E <- min(E, (r_m + B_m + 2 d H_m) / (EFFECT_LEFT C_m))
     d    bound on the change of x within the memory of the slowest filter,
              d = min(r_m + B_m + E H_m, E_start)
-         of the test that a change of x moves at once; for the airspeed r_m + B_m + E H_m times (1 + E) / V
+         where r_m, B_m and H_m are of the test CHANGE_TEST, which a change of x moves at once; for the
+         airspeed the sum is multiplied by (1 + E) / V, which makes a share of m/s
 
 r_m: |filtered residual|; B_m: bound on it for sound sensors, both in the unit of the residual; decay_m: decay
 of the filter per sample; dt s: time between two samples, `mon.h`. `tighten_bounds` says what r_m + B_m is for
@@ -55,8 +56,8 @@ in body axes; p, q, r rad/s):
 Gyros need no such hypothesis: all of a gyro's error is in the test of its own axis in every sample. Neither
 does the dynamic pressure: only the density shows it.
 
-mon: record of the monitor; own: its part `initial` (INITIAL_RECORD); y (N_SENSORS,): readings, SI;
-y_past: those of the sample before. Letters of the effects, `fill_effects` and after it:
+mon: record of the monitor; initial: its part of that name (INITIAL_RECORD); y (N_SENSORS,): readings, SI;
+y_past: those of the sample before. Letters of the kernels that fill H and C:
 
     A        bound on |a| in the step, times dt2, m/s         A_V = A / V, rad
     G        gravity times dt2, m/s
@@ -112,13 +113,14 @@ LAPSE_PER_M, DENSITY_POWER = 2.25577e-5, 4.2559
 # The hypotheses: this sensor has been broken since the monitor began.
 H_AIRSPEED, H_ALPHA, H_BETA, H_PHI, H_THETA = range(5)
 N_INITIAL = 5
-# Rows of C: the error, and the tests in which it shows (EVIDENCE). The two rows after those of EVIDENCE are
-# the part of the force in ALPHA_IN_BETA and in BETA_IN_ALPHA, which can have either sign.
+# Rows of C. Each of the first ten is named by an error and the tests in which the error shows, and has the
+# row of the same number in EVIDENCE. The last two are the parts of the force in ALPHA_IN_BETA and
+# BETA_IN_ALPHA, which can have either sign.
 PHI_IN_TURN, PHI_IN_FLOW, THETA_IN_TURN, THETA_IN_FLOW, ALPHA_IN_BETA, BETA_IN_ALPHA = range(6)
 ALPHA_IN_CLIMB, V_IN_ALPHA, V_IN_BETA, V_IN_DENSITY, FORCE_ON_ALPHA, FORCE_ON_BETA = range(6, 12)
 N_EFFECTS = 12
-# Evidence of an error, a row for each of the first rows of C: the hypothesis, and the tests, first to last,
-# in which the error shows.
+# Evidence of an error, in the order of the rows of C: the hypothesis, the first and the last of the tests in
+# which the error shows.
 EVIDENCE = (
     (H_PHI, TURN_TEST + 1, TURN_TEST + 2),
     (H_PHI, SPEED_TEST, BETA_TEST),
@@ -131,7 +133,7 @@ EVIDENCE = (
     (H_AIRSPEED, BETA_TEST, BETA_TEST),
     (H_AIRSPEED, DENSITY_TEST, DENSITY_TEST),
 )
-# The tests that react at once to a change of the error of each hypothesis; the residual of the first is that
+# By hypothesis, the tests that react at once to a change of its error. The residual of the first test is that
 # change.
 AT_ONCE = (
     (SPEED_TEST, DENSITY_TEST),
@@ -144,11 +146,13 @@ CHANGE_TEST = tuple(tests[0] for tests in AT_ONCE)
 INITIAL_SENSOR = tuple(SENSOR_OF[j] for j in CHANGE_TEST)  # the broken sensor of each hypothesis
 REACTS = np.array([[j in tests for j in range(N_TESTS)] for tests in AT_ONCE])
 
+# Letters as at the top. E_start, E_alarm: E at the first sample, and at the alarm; refuted: whether a test
+# has refuted a hypothesis since the alarm. Tests from RPM_TEST on do not depend on these errors.
 INITIAL_RECORD = record(
     E_start=N_INITIAL, E=N_INITIAL, E_alarm=N_INITIAL, d=N_INITIAL,
     H=(N_INITIAL, RPM_TEST), H_m=(N_INITIAL, RPM_TEST, N_POLES),
     C=(complex, N_EFFECTS), C_m=(complex, N_EFFECTS, N_POLES),
-    refuted=(int, N_INITIAL, N_TESTS),  # whether a test has refuted a hypothesis since the alarm
+    refuted=(int, N_INITIAL, N_TESTS),
 )  # fmt: skip
 
 
@@ -215,15 +219,15 @@ def widen_bounds(mon):
     d <- min(r_m + B_m + E H_m, E_start),    of the airspeed (1 + E) / V times the sum
     E <- min(E + (1 - decay_m) d, E_start)
     """
-    own = mon.initial
+    initial = mon.initial
     m = SLOW_POLE
-    E = own.E
+    E = initial.E
     for h, j in enumerate(CHANGE_TEST):
-        d = allowed_effect(mon, j, m) + E[h] * own.H_m[h, j, m]
+        d = allowed_effect(mon, j, m) + E[h] * initial.H_m[h, j, m]
         if h == H_AIRSPEED:  # from m/s to a share of the truth, which is at least V / (1 + E)
             d *= (1.0 + E[h]) / speed(mon.y_past)
-        own.d[h] = min(d, own.E_start[h])
-        E[h] = min(E[h] + (1.0 - mon.decay[m]) * own.d[h], own.E_start[h])
+        initial.d[h] = min(d, initial.E_start[h])
+        E[h] = min(E[h] + (1.0 - mon.decay[m]) * initial.d[h], initial.E_start[h])
 
 
 @kernel
@@ -327,34 +331,36 @@ def fill_climb_effects(mon, y):
     phi      in altitude' the vertical's part cos(theta) is turned, against `share_across`
     theta    in altitude' the vertical is turned, against v
     """
-    own, d = mon.initial, down(y)
+    initial, d = mon.initial, down(y)
     vertical, step = in_plane(y, d), mon.h * speed(y)
-    slower = 1.0 - min(own.E[H_AIRSPEED], 1.0 - 1.0 / MAX_SPEED_RATIO)
+    slower = 1.0 - min(initial.E[H_AIRSPEED], 1.0 - 1.0 / MAX_SPEED_RATIO)
     climb = abs(mon.y_pred[ALTITUDE] - y[ALTITUDE]) / slower
     lift = step * np.cos(y[I_BETA]) * abs(vertical)
     by_beta = step * np.hypot(vertical.real, d[1].real)
-    own.H[:, CLIMB_TEST] = climb, lift, by_beta, step * share_across(y), step
-    mean = abs(np.angle(complex(-vertical.imag, vertical.real))) + 0.5 * angle_of_chord(own.E[H_ALPHA])
-    own.C[ALPHA_IN_CLIMB] = lift * np.cos(min(mean, 0.5 * np.pi))
+    initial.H[:, CLIMB_TEST] = climb, lift, by_beta, step * share_across(y), step
+    mean = abs(np.angle(complex(-vertical.imag, vertical.real))) + 0.5 * angle_of_chord(initial.E[H_ALPHA])
+    initial.C[ALPHA_IN_CLIMB] = lift * np.cos(min(mean, 0.5 * np.pi))
 
 
 @kernel
 def fill_effects(mon, y_now):
-    """Fill H (N_INITIAL, RPM_TEST) and C (N_EFFECTS,), taken at the sample before, y, from which y_now is
-    predicted: those of SPEED, m/s, and of DENSITY here, those of the other tests by the functions above.
+    """Fill H (N_INITIAL, RPM_TEST) and C (N_EFFECTS,): those of SPEED, m/s, and of DENSITY here, those of the
+    other tests by the functions above. They are evaluated at the sample before, y, from which y_now is
+    predicted.
 
         dt2 = dt (1 + dt (a_max / V + w))        a_max, w: bounds on |a| and on the rate in the step
         SPEED      H = V 0, alpha A, beta A, phi G share_across, theta G
         DENSITY    H = V |2 log(V_now / V)|
 
-    V        the true log V changes by (1 + x) times what the reading shows: the density, with -2 log V, by x
-             times twice that
+    V        the true log V changes by (1 + x) times what the reading shows. The density contains -2 log V,
+             so its residual has the error 2 x log(V_now / V)
     alpha    in V' = a . v / V the direction of v is turned, and changes by x at most
     beta     likewise
     phi      a has the error x g cos(theta) across the body's first axis; V' takes its part along v
     theta    a has the error x g, in the plane of the body's first axis and the vertical: V' takes at most all
-             of it. Along the first axis it is g (sin(reading) - sin(truth)) = x g cos(mean of both). That
-             mean is at most half the error away from the reading, and at most (reading + a right angle) / 2
+             of it. Along the first axis it is g (sin(reading) - sin(truth)) = x g cos(mean of both), which C
+             has. That mean is at most half the error away from the reading, and at most (reading + a right
+             angle) / 2
     """
     dt, y, H, C = mon.h, mon.y_past, mon.initial.H, mon.initial.C
     V, w = speed(y), abs(y[P]) + abs(y[Q]) + abs(y[R])
@@ -375,31 +381,31 @@ def fill_effects(mon, y_now):
 
 @kernel
 def tighten_bounds(mon):
-    """Lower the bound on each error to what the tests allow, filter by filter: of each row of EVIDENCE
+    """Lower the bound on each error to what the tests allow, for each pole m and each row of EVIDENCE:
 
-        E <- min(E, s / (EFFECT_LEFT c)),    s^2 = sum over its tests of (r_m + B_m + 2 d H_m)^2,    c = |C_m|
+        E <- min(E, s / (EFFECT_LEFT c)) if c > 0,    s^2 = sum over the row's tests of (r_m + B_m + 2 d H_m)^2
 
-        *_IN_FLOW                       V (r_m + B_m + 2 d H_m) for each test of flow, m/s as that of SPEED
-        V_IN_DENSITY                    s + 2 (1 + E) / V (r_m + B_m of SPEED) in place of s
-        V_IN_ALPHA, V_IN_BETA           (1 + E) s in place of s
-        ALPHA_IN_BETA, BETA_IN_ALPHA    cos(error / 2) |Re C_m| - sin(error / 2) |Im C_m| - FORCE_ON_*
-                                        in place of c
+    d: while the filter summed the effect, the error was up to d larger or smaller than the present one. c is
+    |C_m|, and s as above, but for these rows:
 
-    The present error was up to d larger or smaller while the filter summed its effect. Together, the tests of
-    speed and flow show a velocity. The effect of a vane on the other has a part of the force in it.
-
-    The tests of the flow have bounds for a right airspeed: a true one that is 1 + E times smaller makes them
-    larger by that. The density shows changes of its error in addition: those are in the airspeed's own test.
+        PHI_IN_FLOW, THETA_IN_FLOW      ALPHA and BETA count V times in s, so that all three terms are in m/s:
+                                        together, SPEED, ALPHA and BETA show a velocity
+        V_IN_DENSITY                    s + 2 (1 + E) / V (r_m + B_m of SPEED): a change of the error shows in
+                                        the density, too, and SPEED limits it
+        V_IN_ALPHA, V_IN_BETA           (1 + E) s: B_m is for a right airspeed, and a true airspeed that is
+                                        1 + E times smaller makes it larger by that factor
+        ALPHA_IN_BETA, BETA_IN_ALPHA    c = cos(error / 2) |Re C_m| - sin(error / 2) |Im C_m| - FORCE_ON_*:
+                                        the effect of a vane on the other has a part of the force in it
     """
-    own = mon.initial
-    E = own.E
+    initial = mon.initial
+    E = initial.E
     V = speed(mon.y_past)
     for m in range(mon.decay.size):
         ratio = 1.0 + E[H_AIRSPEED]
         for n, (h, first, last) in enumerate(EVIDENCE):
-            C_m, s2 = own.C_m[n, m], 0.0
+            C_m, s2 = initial.C_m[n, m], 0.0
             for j in range(first, last + 1):
-                effect = allowed_effect(mon, j, m) + 2.0 * own.d[h] * own.H_m[h, j, m]
+                effect = allowed_effect(mon, j, m) + 2.0 * initial.d[h] * initial.H_m[h, j, m]
                 s2 += (effect * V if n in (PHI_IN_FLOW, THETA_IN_FLOW) and j != SPEED_TEST else effect) ** 2
             s, c = np.sqrt(s2), abs(C_m)
             if n == V_IN_DENSITY:
@@ -408,7 +414,7 @@ def tighten_bounds(mon):
                 s *= ratio
             elif n in (ALPHA_IN_BETA, BETA_IN_ALPHA):
                 half = 0.5 * angle_of_chord(E[h])
-                force = own.C_m[FORCE_ON_ALPHA if h == H_ALPHA else FORCE_ON_BETA, m].real
+                force = initial.C_m[FORCE_ON_ALPHA if h == H_ALPHA else FORCE_ON_BETA, m].real
                 c = np.cos(half) * abs(C_m.real) - np.sin(half) * abs(C_m.imag) - force
             if c > 0.0:
                 E[h] = min(E[h], s / (EFFECT_LEFT * c))
@@ -418,17 +424,17 @@ def tighten_bounds(mon):
 def update_bounds(mon, y):
     """Update all bounds by the sample y, which has just been tested. In a steep attitude the tests of turning
     restart, and so does what their filters have summed of C."""
-    own = mon.initial
+    initial = mon.initial
     if too_steep(mon, y):
-        own.C_m[:] = 0.0
+        initial.C_m[:] = 0.0
         return
     widen_bounds(mon)
     fill_effects(mon, y)
-    for n, C in enumerate(own.C):
-        leak(own.C_m[n], mon.decay, C)
+    for n, C in enumerate(initial.C):
+        leak(initial.C_m[n], mon.decay, C)
     for h in range(N_INITIAL):
         for j in range(RPM_TEST):
-            leak(own.H_m[h, j], mon.decay, own.H[h, j])
+            leak(initial.H_m[h, j], mon.decay, initial.H[h, j])
     tighten_bounds(mon)
 
 
@@ -438,12 +444,12 @@ def refutes_initial(mon, h, j):
     pole m, r_m > factor B_m + x H_m, x = E + d. No hypothesis has an effect on the engine's tests and later
     ones.
     """
-    own = mon.initial
+    initial = mon.initial
     if j >= RPM_TEST:
         return mon.ratio[j] > 1.0
-    x = own.E[h] + own.d[h]
+    x = initial.E[h] + initial.d[h]
     factor = 1.0 + x if h == H_AIRSPEED and j >= SPEED_TEST else 1.0
-    return exceeds(mon.r[j], factor, mon.B[j], x, own.H_m[h, j])
+    return exceeds(mon.r[j], factor, mon.B[j], x, initial.H_m[h, j])
 
 
 @kernel

@@ -75,19 +75,20 @@ from beaver_ftc.plant.instruments import (
 )
 from beaver_ftc.scenario.sensors import N_IN_EQUATIONS
 
-# The rates are against the rotating Earth; the level turns as the aircraft flies over the round Earth.
+# Turn of the attitude that the integration leaves out: the gyros measure the rates against the rotating
+# Earth, and the level turns while the aircraft flies over the round Earth.
 EARTH_TURN_RAD_S = 4e-5
-EARTH_M_S2 = 0.03  # Coriolis, centrifugal, and gravity's change with place
-DENSITY_SCALE_HEIGHT_M = 6300.0  # over which the density falls by a factor e at most: in the stratosphere
+# Acceleration that it leaves out: of Coriolis, the centrifugal one, and the change of gravity with place.
+EARTH_M_S2 = 0.03
+DENSITY_SCALE_HEIGHT_M = 6300.0  # smallest height over which the density falls by e: in the stratosphere
 MAX_PITCH_RAD = 1.3  # beyond it, roll and heading cannot be distinguished: the attitude tests restart
-MIN_AIRSPEED_MPS = 1.0  # at least so much where an airspeed divides
-MIN_QDYN_PA = 1.0  # the same of the dynamic pressure
-MIN_HALF_DENSITY = 1e-9  # kg/m3, of which the logarithm is taken: far below half a density
-MIN_SPEED_MPS = 1e-3  # at least so much where a predicted speed divides
-# A reading less its constant error is at least this share of the reading, where a logarithm is taken.
-MIN_SHARE_LEFT = 0.01
-READING_ROUNDING = 1e-10  # of a reading: the part of each bound that covers rounding
-COMPARISON_ROUNDING = 1e-6  # in the unit of the reading: the same where two readings are compared directly
+MIN_AIRSPEED_MPS = 1.0  # lower limit of an airspeed that divides, or of which the logarithm is taken
+MIN_QDYN_PA = 1.0  # lower limit of a dynamic pressure of which the logarithm is taken
+MIN_HALF_DENSITY = 1e-9  # kg/m3: lower limit of qdyn / V^2 in the logarithm, far below half a density of air
+MIN_SPEED_MPS = 1e-3  # lower limit of a predicted speed that divides
+MIN_SHARE_LEFT = 0.01  # lower limit of 1 - e / y in a bound on log(y): e is the constant error of y
+READING_ROUNDING = 1e-10  # part of each bound that covers rounding, as a share of the reading
+COMPARISON_ROUNDING = 1e-6  # the same for two readings that are compared directly, in their unit
 # JSBSim integrates the velocity by Adams and Bashforth's second order, v + h (3/2 a - 1/2 a_before).
 AB_NOW, AB_PAST = 1.5, 0.5
 # It integrates the position by their third order, h (23 v - 16 v_before + 5 v_earlier) / 12. That differs
@@ -97,35 +98,45 @@ FORCE_JUMP_M_S2 = 8.0  # a sound specific force changes by less from one sample 
 
 # What the tests read and fill, in the record of the monitor.
 TEST_FIELDS = {
-    "h": float, "decay": N_POLES, "g": float,  # decay: of each filter per sample; g m/s2
-    # Declared turbulence, m/s: bound on a gust's speed; bound on its changes through each filter, which
-    # holds up to max_airspeed_mps, and above low_m: below it a gust changes faster
+    "h": float, "decay": N_POLES, "g": float,  # s; decay of each filter per sample; gravity, m/s2
+    # Declared turbulence: gust_max bounds the speed of a gust, gust_change its changes through each filter,
+    # both m/s. gust_change holds up to max_airspeed_mps and above low_m: lower, a gust changes faster.
     "gust_max": float, "gust_change": N_POLES, "max_airspeed_mps": float, "low_m": float,
-    "wind_max": float,  # of the vertical wind, m/s
-    # Declared errors, SI: |error| <= e_zero + e_slope |y|, of which const does not change; of the attitude,
-    # rad/s
+    "wind_max": float,  # bound on the vertical wind, m/s
+    # Declared errors, SI: |error| <= e_zero + e_slope |y|; const is the part that does not change. drift: of
+    # the attitude, rad/s.
     "e_zero": N_SENSORS, "e_slope": N_SENSORS, "const": N_SENSORS, "drift": float,
-    # Bounds on the error of each reading; e_drift: part of them by drift, rad
+    # Bounds on the error of each reading (see the table at the top); e_drift, rad: their part by drift so far
     "e": N_SENSORS, "n": N_SENSORS, "e_drift": float, "e_past": N_SENSORS, "e_older": N_SENSORS,
-    # of the sample before; predict_readings turns a_past into the present axes
+    # Readings in the sample before, and in that before it; accelerations as vectors (rotation.py), m/s2: in
+    # the sample before, and in that before it, turned by `predict_readings` into the axes of the next one
     "y_past": N_SENSORS, "y_older": N_SENSORS, "a": (complex, 2), "a_past": (complex, 2),
-    # m/s2: |a| in the elapsed step and in the two before it; of a_past
+    # |a| in the elapsed step and in the two before it; |a_past|; m/s2
     "a_size": 3, "a_size_past": float,
-    "e_first": float,  # m/s2, in the first step only: no sample precedes it
-    "y_pred": N_SENSORS,  # of the engine's readings: the commands
-    # By test, in the unit of the residual. per_s, per_sample: parts of the bound on the residual of one
-    # sample, the first for each second of it; past: per_sample of the sample before. gust: effect on the
-    # residual of 1 m/s that a gust changes by. r: filtered residual. B: bound on |r|; e_sum: the part of it
-    # that the filter sums. ratio: largest |r| / B over the poles.
+    "e_first": float,  # error of the acceleration in the first step, m/s2: no sample precedes that step
+    "y_pred": N_SENSORS,  # predicted readings; those of the engine are the commands
+    # By test, in the unit of the residual:
+    #     per_s, per_sample    bound on the residual of one sample: h per_s + per_sample + past
+    #     past                 per_sample of the sample before
+    #     gust                 effect on the residual of a gust that changes by 1 m/s
+    #     r, B                 filtered residual, and the bound on |r|; e_sum: part of B, summed by the filter
+    #     ratio                largest |r| / B over the poles
     "residual": N_TESTS, "per_s": N_TESTS, "per_sample": N_TESTS, "past": N_TESTS, "gust": N_TESTS,
     "r": (N_TESTS, N_POLES), "B": (N_TESTS, N_POLES), "e_sum": (N_TESTS, N_POLES), "ratio": N_TESTS,
-    "agreed": (int, max(len(DUPLICATES), 1)),  # a sensor with the reading that it should equal
+    # whether each duplicate sensor has agreed with the reading that it should equal, before any alarm
+    "agreed": (int, max(len(DUPLICATES), 1)),
 }  # fmt: skip
 
 
 @kernel
 def bound_readings(mon, y):
-    """Bounds by declaration: e = (e_zero + e_slope |y|) / (1 - e_slope), and n = e - const."""
+    """Fill the bounds on the errors of the readings y by the declaration:
+
+        e = (e_zero + e_slope |y|) / (1 - e_slope) [+ e_drift]      n = e - const + READING_ROUNDING |y|
+
+    The error is declared as a share e_slope of the truth, which is at most |y| + e: hence the divisor. The
+    attitude drifts by e_drift, slowly, so the drift is no part of n.
+    """
     for i in range(N_SENSORS):
         size = abs(wrapped(y[i]) if i == PSI else y[i])
         e = (mon.e_zero[i] + mon.e_slope[i] * size) / (1.0 - mon.e_slope[i])
@@ -151,9 +162,10 @@ def predict_readings(mon):
         q <- q step                                       q = z1 + z2 j, of which
         phi = arg(z1^2 - z2*^2),  2 z1 z2 = sin(theta) + i cos(theta) sin(psi)
         altitude <- altitude + h (v upwards)
-        v <- v + h (3/2 a - 1/2 a_past)                   then turned by step; in the axes before it till then
+        v <- v + h (3/2 a - 1/2 a_past)                   in the axes before the step; then turned by step
 
-    At the end a, turned by step, is the a_past of the next sample.
+    A vector of fixed direction, turned by step, is q* v q: its components in the axes after the step. At the
+    end a, turned by step, is the a_past of the next sample.
     """
     h, y, past = mon.h, mon.y_pred, mon.y_past
     w = vector(past)
@@ -189,8 +201,13 @@ def half_density(y):
 
 @kernel
 def fill_residuals(mon, y, q):
-    """Fill the residual of each test: y - y_pred; of turning 2 (q* q_now); of the density
-    log(rho / rho_past), rho = qdyn / V^2. q: the attitude as predicted.
+    """Fill the residual of each test:
+
+        turning    2 (q* q_now), rad: the vector part, small, is half the turn; -q_now is the same attitude
+        density    log(rho / rho_past),  rho = qdyn / V^2
+        others     y - y_pred
+
+    q, q_now: the attitude as predicted, and as measured.
     """
     turn = times(inverse(q), attitude(y))
     side = 2.0 if turn[0].real >= 0.0 else -2.0
@@ -203,25 +220,26 @@ def fill_residuals(mon, y, q):
 
 @kernel
 def highest(mon, y, i):
-    """Bound |y_i| in this sample and the one before: |y| + e."""
+    """Largest |y_i| that the truth may have in this sample or the one before: |y| + e."""
     return max(abs(y[i]) + mon.e[i], abs(mon.y_past[i]) + mon.e_past[i])
 
 
 @kernel
 def lowest(mon, y, i):
-    """Lower bound on y_i in this sample and the one before: y - e."""
+    """Smallest y_i that the truth may have in this sample or the one before: y - e."""
     return min(y[i] - mon.e[i], mon.y_past[i] - mon.e_past[i])
 
 
 @kernel
 def secant(angle):
-    """1 / cos(angle), rad, of no more than MAX_PITCH_RAD."""
+    """1 / cos(angle) of an angle, rad, that is limited to MAX_PITCH_RAD."""
     return 1.0 / np.cos(min(abs(angle), MAX_PITCH_RAD))
 
 
 @kernel
 def too_steep(mon, y):
-    """Whether the tests of turning and of the angles restart, in this sample and the one before."""
+    """Whether the pitch may exceed MAX_PITCH_RAD in this sample or the one before: then the tests of turning
+    and of the angles restart."""
     return highest(mon, y, THETA) > MAX_PITCH_RAD
 
 
@@ -232,9 +250,11 @@ def bound_acceleration(mon, w_max, e_w):
         EARTH + e_first + h/2 e_w |a_past| + g sum (e_i + h w_max const_i)        i: phi, theta
               + sum h w_max const_i + sqrt(sum e_i^2)                             i: accelerometers
 
-    A sensor adds to 3/2 y - 1/2 y_before the error 3/2 e_past + 1/2 e_older - const at most: accelerometers,
-    and the attitude, which gives gravity its direction. Turning the previous acceleration into the present
-    axes adds more.
+        e_i = 3/2 e_past_i + 1/2 e_older_i - const_i
+
+    e_i is the largest error that sensor i adds to 3/2 y - 1/2 y_before: its constant part counts once. The
+    attitude gives gravity its direction. The previous acceleration is turned into the present axes, by rates
+    with the error e_w, and with it the constant errors.
     """
     e_a, force2 = EARTH_M_S2 + mon.e_first + mon.h * AB_PAST * e_w * mon.a_size_past, 0.0
     for i in (PHI, THETA, AX, AX + 1, AX + 2):
@@ -250,8 +270,7 @@ def bound_acceleration(mon, w_max, e_w):
 
 @kernel
 def bound_attitude(mon, y, w_max, e_w):
-    """Fill the bounds b (per_s) and n (per_sample) for the tests of the attitude; sec: largest 1 /
-    cos(theta).
+    """Fill per_s and per_sample for the tests of turning and of the angles; sec: largest 1 / cos(theta).
 
         turning, axis i   per_s = EARTH_TURN + 2 drift + e_i + axes      per_sample = n_i + coupled_i
         axes =   w_max (e_phi + (1 + sec) e_theta + e_psi)        constant error: it changes J
@@ -261,8 +280,9 @@ def bound_attitude(mon, y, w_max, e_w):
         angles = EARTH_TURN + (1 + sec h w_max) e_w               gyros, to second order in h
                + 2 sec w_max (e_phi + e_theta)                    constant error in the inverse of J
 
-    The rates are J(phi, theta) (phi', theta', psi'). coupled: what a momentary error of psi and theta turns
-    about the other axes.
+    The rates are J(phi, theta) (phi', theta', psi'). e, n, const: bounds of the readings; tilt: change of phi
+    and theta in the sample, rad; momentary: bounds on the changing errors of theta and psi, in the sample
+    before and now, rad; coupled_i: turn about axis i by a momentary error of psi or theta, rad.
     """
     h, e, n, past, const = mon.h, mon.e_past, mon.n, mon.y_past, mon.const
     sec = secant(highest(mon, y, THETA))
@@ -282,17 +302,19 @@ def bound_attitude(mon, y, w_max, e_w):
 
 @kernel
 def bound_flow(mon, y, w_max, e_w):
-    """Fill the bounds b (per_s) for the tests of flow and climb: the largest derivative of their kinematics
-    with respect to each reading, times the bound e of the reading.
-
-    sec: largest 1 / cos(beta); growth: 1 and the second order in h; gust: how much faster a gust changes;
-    lag: what the altitude's integration differs from h v, m/s.
+    """Fill per_s for the tests of flow and climb: the largest derivative of their kinematics with respect to
+    each reading, times the bound e of the reading.
 
         speed         e_a + growth a vane + h (a / V)^2 e_V
         each angle    growth (sec^2 ((e_a + a (vane + e_V / V)) / V + w_max vane) + sec e_w)
         climb         gusts and wind + (V + e_V) (e_phi + e_theta + vane) + e_V + lag
 
-    A gust of 1 m/s changes the speed by gust, and each angle by gust sec / V.
+    a m/s2: bound on the acceleration; V m/s: smallest airspeed (in climb its reading); vane = e_alpha +
+    e_beta; sec: largest 1 / cos(beta); growth: 1 + the second order in h; lag m/s: difference of the
+    integration of the altitude from h v, over h.
+
+    A gust of 1 m/s changes the speed by `gust`, and each angle by gust sec / V: gust is the factor by which
+    gusts change faster than `gust_change` at this airspeed and height.
     """
     h, e, a_size = mon.h, mon.e_past, mon.a_size
     V = max(lowest(mon, y, I_AIRSPEED), MIN_AIRSPEED_MPS)
@@ -314,12 +336,15 @@ def bound_flow(mon, y, w_max, e_w):
 
 @kernel
 def bound_density(mon, y):
-    """Fill the bounds b (per_s) and n (per_sample) for the logarithm of the density: climb over the scale
-    height, and log(y^power) of the dynamic pressure and of the airspeed: of a constant error e
+    """Fill per_s and per_sample for the logarithm of the density, log(qdyn) - 2 log(V):
 
-        power e |1 / y - 1 / y_past| / (1 - e / y_min)
+        per_s         climb / DENSITY_SCALE_HEIGHT_M + sum power e_log / h
+        e_log         const |1 / y - 1 / y_past| / (1 - const / y_min)
+        per_sample    sum power n / (y - e)
 
-    and of n    power n / (y - e)
+    The sums are over the dynamic pressure (power 1) and the airspeed (power 2): const is the constant error
+    of the reading y, n its changing error, y_min the smaller of y and y_past. climb m/s: largest vertical
+    speed.
     """
     past = mon.y_past
     climb = past[I_AIRSPEED] + mon.e_past[I_AIRSPEED] + mon.wind_max + mon.gust_max
@@ -334,8 +359,7 @@ def bound_density(mon, y):
 
 @kernel
 def bound_residuals(mon, y):
-    """Fill b (per_s) and n (per_sample) of each test: the largest effect of sound sensors with declared
-    errors.
+    """Fill per_s and per_sample of each test: the largest effect of sound sensors with declared errors.
 
     The errors of the sample before act through the prediction, those of this sample through the reading that
     is compared with it. The causes of the terms of first order are in docs/explanation/instruments.md (Bounds
@@ -356,11 +380,10 @@ def bound_residuals(mon, y):
 def filter_test(mon, j):
     """Pass the residual of test j through its filters, a = exp(-pole h); find its largest ratio to the bound:
 
-        r <- a r + residual,    B = T_b + T_n + n + gust gust_change,    ratio = max |r| / B
-        T_b <- a T_b + h b,    T_n <- a T_n + (1 - a) n_past        `filters.advance_bound`
+        r <- a r + residual,    B = e_sum + n + gust gust_change,    ratio = max |r| / B
+        e_sum <- a e_sum + h b + (1 - a) n_past        `filters.advance_bound`
 
-    b: per_s, n: per_sample, n_past: of the sample before; T_b + T_n: e_sum, the part that the filter sums;
-    all of the test, in the unit of its residual, b over s.
+    b: per_s, in the unit of the residual over s; n, n_past: per_sample of this sample and of the one before.
     """
     r, e, B, n = mon.r[j], mon.e_sum[j], mon.B[j], mon.per_sample[j]
     mon.ratio[j] = 0.0
@@ -374,8 +397,8 @@ def filter_test(mon, j):
 
 @kernel
 def restart_tests(mon, n):
-    """Restart the first n tests with this sample: their filters are empty, and the whole bound per sample is
-    still due."""
+    """Restart the first n tests with this sample: their filters are empty, and e_sum has the error that the
+    reading of this sample brings into the next prediction."""
     mon.ratio[:n] = mon.residual[:n] = mon.r[:n] = 0.0
     for j in range(n):
         mon.e_sum[j] = mon.past[j] = mon.per_sample[j]
@@ -391,9 +414,9 @@ def compare(mon, j, residual, bound):
 
 @kernel
 def compare_duplicates(mon, y, fresh):
-    """Compare each duplicate sensor i with the reading j that it should equal, in the samples in which it is
-    fresh; fresh (sampled sensors,). One of the two is broken if they differ by more than tolerance + e_i +
-    e_j. Those that have agreed before any alarm are recorded.
+    """Compare each duplicate sensor i with the reading j that it should equal, in the samples in which sensor
+    i is read; fresh (sampled sensors,): whether each is. One of the two is broken if they differ by more than
+    tolerance + e_i + e_j. `agreed` records the pairs that have agreed before any alarm.
     """
     for d in range(DUPLICATE.size):
         i, j, test = DUPLICATE[d], COUNTERPART[d], N_EQUATIONS + d
@@ -409,7 +432,7 @@ def start_tests(mon, y, force):
     """Start with the first sample, before which no reading is known; force (3,) m/s2."""
     bound_readings(mon, y)
     store_sample(mon, y, force)
-    store_sample(mon, y, force)  # also for the sample before it
+    store_sample(mon, y, force)  # twice: y_older and e_older are those of this sample, too
     mon.a_past[:] = mon.a
     mon.a_size[:2] = length(mon.a) + FORCE_JUMP_M_S2
     mon.e_first = AB_PAST * FORCE_JUMP_M_S2

@@ -19,9 +19,9 @@ coarse estimate (likelihood.py).
 
 V is the speed relative to the field of gusts. The mean wind carries that field [MIL-F-8785C, 3.7.1], so V is
 the speed relative to the mean air. The airspeed differs from V by the gust itself. The gust velocity is the
-sum of its changes; unknown are its initial value and the drift of accelerometers and attitude. The record's
-`v_g` is that sum, with a decay as slow as this drift permits. A relative error e
-of V leaves at most e^2 / 4 of the gust's intensity unmeasured (`gusts_design.speed_error_share`).
+sum of its changes, apart from its initial value and the drift of accelerometers and attitude, which are
+unknown. The record's `v_g` is that sum, with a decay as slow as this drift permits. A relative error e of V
+leaves at most e^2 / 4 of the gust's intensity unmeasured (`gusts_design.speed_error_share`).
 
 The intensity of turbulence is that above 2000 ft, or that at the height flown if it is larger.
 
@@ -30,8 +30,8 @@ v' = v + dt (3 a - a_prev) / 2.
 
 gusts_design.py fills the record from what a scenario declares.
 
-Letters of the kernels. i is a body axis, j an axis of the gusts, about which they roll, pitch or yaw; q, r at
-the end: pitch, yaw.
+Letters of the kernels. i and k are body axes, j an axis of the gusts, about which they roll, pitch or yaw. An
+index _q or _r at the end of a letter is pitch or yaw.
 
     v, v_g         velocity relative to the air; gust since the start, m/s in level axes
     V              speed relative to the mean air, m/s
@@ -40,7 +40,9 @@ the end: pitch, yaw.
     w, tau         rotation of the air in the gusts' axes, rad/s; its lag, s
     acc            effect of w on the rates, rad/s2
     L              rate damping, angular acceleration per rad/s (3, 3), 1/s; of a view (3,)
-    Q              intensity of the drift of w over V, rad2/s3 per m/s; Q_V: of an acceleration
+    Q              intensity of the drift of w over V, rad2/s3 per m/s
+    Q_V            intensity of the drift of an acceleration over V, (rad/s2)2/s per m/s
+    share          part of Q, or of a variance, that the vanes leave unmeasured
 """
 
 from math import pi
@@ -59,43 +61,45 @@ from beaver_ftc.plant.instruments import wrapped
 # exact vanes and over a filter's memory it is smaller (`tests/diagnosis/test_gusts.py`).
 MIN_UNMEASURED_SHARES = (1.0, 0.003, 0.03)
 MIN_BANK_COSINE = 0.5  # cosine of the steepest bank at which lift is assumed to balance the weight
-# share of a gust's own intensity below which the turn of its axes is ignored
+# Share of a gust's own intensity below which the turn of its axes is ignored
 FAST_TURN_SHARE = 0.01
 
 GUST_CONFIG_RECORD = record(
     has_forces=int, coarse_only=int,  # whether the design model has forces; whether the estimate is coarse
-    S_m=float, gravity=float, span=float,  # S / m, m2/kg; m/s2; b, m
-    Q_aloft=3, Q_1m=3,  # Q above 2000 ft; at a height of 1 m
-    h0=float, h1=float,  # bound on the altimeter's error: offset, m; slope
-    v_max=float, a_v=float,  # limit of a component of v_g, m/s; decay of v_g, 1/s
-    # Error variance of V, (m/s)2; variance of the gust, (m/s)2; share of a gust's intensity that a relative
-    # error of V leaves, over the variance of that error.
+    S_m=float, gravity=float, span=float,  # wing area over mass, m2/kg; m/s2; b, m
+    Q_aloft=3, Q_1m=3,  # Q above 2000 ft, and at a height of 1 m
+    h0=float, h1=float,  # bound on the altimeter's error: offset, m, and slope
+    v_max=float, a_v=float,  # limit of a component of v_g, m/s; decay rate of v_g, 1/s
+    # var_V, var_v: variance of the error of V, and of the gust, (m/s)2. speed_error_share: share of a gust's
+    # intensity that a relative error of V leaves unmeasured, over the variance of that error.
     var_V=float, var_v=float, speed_error_share=float,
     L_roll=float, L_gust=float,  # correlation lengths of the rolling gust and of the gusts, m
 )  # fmt: skip
 
 GUST_MEMORY_RECORD = record(
-    # whether a_prev is valid; reading of the accelerometers, m/s2; force coefficients
+    # Whether a_prev is valid; reading of the accelerometers, m/s2; coefficients of the forces
     has_prev=int, f_read=3, table=TABLE, scratch=MAX_MONOMIALS,
-    v=3, f=3, T=(3, 3), heading=float, a_prev=3,  # a an instant before, in level axes of now
-    w=3, w_body=3, acc_sum=3,  # w in body axes; sum of acc over the instants of a frame
-    Q=3, share=3,  # share of Q that the vanes do not measure
-    v_g=3, start_left=float,  # share of the variance of the initial gust that still counts
-    # Unmeasured shares: of the yawing gust by the turn at this instant, and decaying since earlier turns; of
-    # the pitching gust that was present when the diagnosis started.
+    # a_prev: a of the instant before, in the level axes of this instant; heading rad
+    v=3, f=3, T=(3, 3), heading=float, a_prev=3,
+    w=3, w_body=3, acc_sum=3,  # w_body: w in body axes; acc_sum: sum of acc over the instants of a frame
+    Q=3, share=3,  # at this altitude; what vanes leave of it in any case (MIN_UNMEASURED_SHARES)
+    v_g=3, start_left=float,  # start_left: share of the variance of the initial gust that still counts
+    # Further unmeasured shares. turn_now, turn_past: of the yawing gust, by the turn of the heading at this
+    # instant, and by earlier turns, decaying; start_share: of the pitching gust that was present when the
+    # diagnosis started, decaying.
     turn_now=float, turn_past=float, start_share=float,
     C_dot=(3, 3), turns_fast=int,  # turn of C, 1/s; whether it counts
-    # Variance of acc by that turn, (rad/s2)2: in this frame, in the frame before; frames that it lasts.
+    # Variance of acc by that turn, (rad/s2)2, of this frame and of the one before; frames for which it counts
     var_now=(3, 3), var_prev=(3, 3), n_turn=int,
 )  # fmt: skip
 
 GUST_OUTPUT_RECORD = record(
-    # Whether there is turbulence; whether accelerometers are used; whether the gust is measured. These are
-    # filled by configure, and end with the accelerometers.
+    # Whether turbulence is declared; whether accelerometers are used; whether the gust is measured. The
+    # configuration fills these, and `drop_accelerometers` may clear the last two.
     gusty=int, uses_accelerometers=int, measured=int,
-    acc=3, acc_mean=3, acc_coarse=3,  # of the measured gust, now and mean of the frame; of the coarse one
-    var_turn=(3, 3), V=float,  # var_now plus var_prev
-    rate_damping=(3, 3), C=(3, 3),
+    acc=3, acc_mean=3, acc_coarse=3,  # by the measured gust: now, and mean over the frame; by a coarse one
+    var_turn=(3, 3), V=float,  # var_turn: var_now plus var_prev
+    rate_damping=(3, 3), C=(3, 3),  # rate_damping: L
 )  # fmt: skip
 
 GUST_RECORD = record(config=GUST_CONFIG_RECORD, memory=GUST_MEMORY_RECORD, output=GUST_OUTPUT_RECORD)
@@ -127,17 +131,20 @@ def fill_rotation(phi, th, T):
 
 @kernel
 def project_gust(v, C, j):
-    """v' C_j, along column j of a rotation C (3, 3): component j, in the axes that C turns to body axes, of a
-    vector v (3,) in body axes; or the sensitivity to the gust about axis j, of one v to rotation about the
-    body axes."""
+    """v' C_j, with C_j (3,) the column j of a rotation C (3, 3) to body axes.
+
+    It is component j of a vector v (3,) that is given in body axes, in the axes from which C turns. Or, if v
+    is a sensitivity to rotation about the body axes, it is the sensitivity to the gust about axis j.
+    """
     return v[0] * C[0, j] + v[1] * C[1, j] + v[2] * C[2, j]
 
 
 @kernel
 def fill_velocity(gust, y, attitude):
-    """Fill attitude, heading and v = T' (velocity relative to the air) of this instant.
+    """Fill T, the heading, and v = T' V (cos(alpha) cos(beta), sin(beta), sin(alpha) cos(beta)) of this
+    instant, in level axes.
 
-    y (5,) and attitude (3,) rad as measured.
+    y (5,) and attitude (3,) rad as measured; V m/s: airspeed.
     """
     mem, V, alpha, beta = gust.memory, y[AIRSPEED], y[ALPHA], y[BETA]
     fill_rotation(attitude[0], attitude[1], mem.T)
@@ -168,9 +175,10 @@ def turned(v, z):
 
 @kernel
 def update_axes(gust, z):
-    """Fill `C` for this instant, and keep that of the instant before in `C_dot`.
+    """Fill C for this instant, and keep the C of the instant before in C_dot, for `fill_axes_rate`.
 
-    z = exp(-i change of heading). JSBSim's gusts have the heading of the step before.
+    z = exp(-i change of heading). The axes of JSBSim's gusts have the heading of the step before, so C has
+    the rows of T in the level axes of that step.
     """
     T, C = gust.memory.T, gust.output.C
     gust.memory.C_dot[:] = C
@@ -200,10 +208,8 @@ def advance_gust(gust, y, attitude, dt):
         v_still = v + dt (3 a - a_prev) / 2,  a = T' f + gravity,  in the level axes of now
         dv = v_still - v,  v as measured now: change of the gust
 
-    y (5,) and attitude (3,) rad as measured now; f and T in memory are those dt s ago. If the heading turns
-    so fast that the vanes mostly measure this turn, as when the nose passes the vertical, the yawing gust
-    only decays, and the sum of changes v_g starts again. It does so one instant longer: JSBSim's gusts turn a
-    step after the heading.
+    y (5,) and attitude (3,) rad as measured now. The order matters: f and T in memory are still those of dt s
+    ago, until `fill_velocity` replaces T and v; f is replaced later, by `fill_gust_effect`.
     """
     mem, v, prev, g = gust.memory, gust.memory.v, gust.memory.a_prev, gust.config.gravity
     turn = wrapped(attitude[2] - mem.heading)
@@ -230,11 +236,16 @@ def update_rotation(gust, dv, psi_dot, dt):
 
     dv (3,) m/s: change of the gust in level axes; psi_dot rad/s: rate of the heading; dt s.
 
-    The gusts turn with the aircraft: a gust from ahead, of deviation sigma, becomes one from the side. This
-    adds a change of rate sigma to the walk of intensity 3 sigma^2 V / L. The ratio of their squares over the
-    lag of the yawing gust, 3 b / pi V, is the share of its intensity that is unmeasured:
+    The gusts turn with the aircraft: a gust from ahead, of deviation sigma, becomes one from the side, at the
+    rate psi_dot sigma. The gust itself is a walk of intensity 3 sigma^2 V / L. The square of that rate over
+    this intensity, times the lag of the yawing gust, 3 b / pi V, is the share of the intensity that is
+    unmeasured:
 
-        share = psi_dot^2 b L / (pi V^2)
+        share = psi_dot^2 b L / (pi V^2)        turn_past <- min(max(a_r turn_past, larger), 1)
+
+    larger: the larger share of this instant and of the one before, because JSBSim's gusts turn a step after
+    the heading. If it reaches 1, as when the nose passes the vertical, the vanes mostly measure the turn: the
+    yawing gust then only decays, and the sum of changes v_g starts again.
     """
     cfg, mem, V = gust.config, gust.memory, gust.output.V
     tau_q, tau_r = gust_lag(gust, PITCH, V), gust_lag(gust, YAW, V)
@@ -328,7 +339,8 @@ def fill_specific_force(gust, x, y, u):
 
 @kernel
 def begin_gust_sums(gust, V, dt):
-    """Start the sums over the next frame's instants, dt s apart, with this instant; V m/s."""
+    """Start acc_sum of the next frame with this instant, and add to var_now what the turn of C does in the
+    dt s to the next instant; V m/s."""
     gust.memory.acc_sum[:] = gust.output.acc
     add_turn_variance(gust, V, dt)
 
@@ -366,8 +378,9 @@ def unmeasured_share(gust, j):
 
         share_j + speed_error_share (var_V + start_left var_v) / V^2 + passing
 
-    share_j: what vanes leave; the second term: by the error of V; passing: of the pitching gust that was
-    there at the start, or of the yawing gust by turns. The rolling gust has only the first.
+    share_j: what vanes leave in any case. The second term is by the error of V, if the gust is measured.
+    passing: of the pitching gust start_share, of the yawing gust turn_past. The rolling gust has only the
+    first term.
     """
     cfg, mem, V = gust.config, gust.memory, max(gust.output.V, 1.0)
     if j == ROLL:
@@ -394,8 +407,9 @@ def unmeasured_drift(gust, V, i_1, i_2, as_rolling=False):
 
         V sum_j (L C)_i1j (L C)_i2j share_j Q_j
 
-    as_rolling: that of a gust with the correlation length of the rolling gust and equal power at low
-    frequency. Vanes leave a rest of unknown spectrum; its intensity stays.
+    as_rolling: of a gust with the correlation length of the rolling gust and equal power at low frequency, if
+    no gust is measured: then Q_j is scaled by (tau_j V / L_roll)^2. What vanes leave of a measured gust has
+    an unknown spectrum, so its intensity stays.
     """
     cfg, C, Q_V = gust.config, gust.output.C, 0.0
     for j in range(3):
@@ -411,7 +425,7 @@ def add_turn_variance(gust, V, dt):
 
         dt V sum_j (L C_dot)_ij (L C_dot)_kj tau_j^2 Q_j share_j / 2      j: roll, yaw
 
-    share: 1 of the rolling gust, which no vane measures; turn_past of the yawing gust.
+    share: 1 for the rolling gust, which no vane measures; turn_past for the yawing gust.
     """
     mem = gust.memory
     if mem.turns_fast:
@@ -422,8 +436,10 @@ def add_turn_variance(gust, V, dt):
 
 @kernel
 def add_variance(gust, C, j, q):
-    """Add to var_now the variance of the accelerations by a variance q of the gust about axis j; C as of
-    `effect_product`. It lasts for three frames."""
+    """Add to var_now the variance of the accelerations by a variance q of the gust about axis j: q times
+    `effect_product`. It counts for three frames: `finish_gust` adds it in this frame and the next, and one
+    frame more clears it.
+    """
     for i in range(3):
         for k in range(3):
             gust.memory.var_now[i, k] += q * effect_product(gust, C, i, k, j)
@@ -455,9 +471,10 @@ def view_drift(gust, V, L_rate, L_force, subtracted):
 
         V sum_j (sqrt(share_j) |L_rate' C_j| + |L_force' C_j|)^2 Q_j
 
-    subtracted: the gust estimate is subtracted from the rates. Otherwise share is 1, and each j adds
-    (tau L_rate' C_dot_j)^2 Q_j / 2 if C turns fast. On the forces the whole rotation acts. L_rate, L_force
-    (3,) 1/s: gust sensitivity of the rates and of the forces, about the body axes.
+    L_rate, L_force (3,) 1/s: sensitivity of the view's rates and of its forces to rotation about the body
+    axes. subtracted: the gust estimate is subtracted from the rates, so that only a share of the gust acts on
+    them. Otherwise share is 1, and each j adds (tau L_rate' C_dot_j)^2 Q_j / 2 if C turns fast. The forces
+    always contain the whole gust.
     """
     C, mem, Q_V = gust.output.C, gust.memory, 0.0
     tau = 0.0 if subtracted or not mem.turns_fast else gust_lag(gust, ROLL, V)
@@ -472,7 +489,7 @@ def view_drift(gust, V, L_rate, L_force, subtracted):
 def effect_product(gust, C, i_1, i_2, j):
     """Product of the effects of the gust about axis j on two accelerations, (L C)_i1j (L C)_i2j.
 
-    C (3, 3): axes of the gusts, giving 1/s2; or their rate, 1/s, giving 1/s4.
+    C (3, 3): rotation from the axes of the gusts, for a product in 1/s2; or C_dot, for one in 1/s4.
     """
     L = gust.output.rate_damping
     return project_gust(L[i_1], C, j) * project_gust(L[i_2], C, j)

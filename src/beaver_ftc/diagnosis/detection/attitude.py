@@ -17,8 +17,9 @@ what was before the fault only adds noise:
 
     z <- a z + g / sqrt S          N <- b N + g_s g / S      M <- b M + g_s^2 / S
 
-Unknown constants c_j, |c_j| <= tol_j, multiply known accelerations r_j: the coefficients, and of each axis
-alone the bounded uncertainty and the damping. Through the same filter they add z_j and R_j to the sums.
+Unknown constants c_j, |c_j| <= tol_j, multiply known accelerations r_j: the errors of coefficients, and for
+each axis by itself the bounded uncertainty and errors of the damping. Through the same filter they add
+c_j z_j and c_j R_j to the sums.
 Without a fault of a surface
 
     (|z| - sum_j tol_j |z_j|) sqrt(1 - a^2)          (|N| - sum_j tol_j |R_j|) / sqrt M
@@ -43,9 +44,10 @@ Letters of the record and of the kernels, for each axis i:
                     g_s, the signature of the loss
     r, g_j          known accelerations r_j, rad/s2; responses to them over sqrt S
     n               number of the constants: those of the block, then the N_FURTHER
-    z, z_j          leaky sums of g and g_j over sqrt S; m counts their leaks a
-    N, M, R_j       correlations with the loss h; b: their leak
-    T, E            leaky sums of dA, and of its bound by constant errors, rad
+    z, z_j          leaky sums of g and g_j over sqrt S; a (m,): their leaks per frame
+    N, M, R_j       correlations with the loss h; b: their leak per frame
+    T, E            leaky sums of dA, and of its bound by constant errors, rad; their leaks are a, too
+    a_d             factor of the drift d per frame (`a` of the block)
     blk, row        block of the rates (likelihood.py) and row of the axis in it
 """
 
@@ -66,9 +68,9 @@ from beaver_ftc.diagnosis.state import LOSS
 from beaver_ftc.scenario.declared import SensorErrors
 
 ANGLES = ("phi", "theta", "psi")
-LEAK_TIMES_S = (0.1, 0.3, 1.0, 3.0)
-LOSS_MEMORY_S = 30.0
-COUPLED_SHARE = 0.05  # of an error of one gyro in the turns about the other axes
+LEAK_TIMES_S = (0.1, 0.3, 1.0, 3.0)  # time constants of the leaky sums
+LOSS_MEMORY_S = 30.0  # time constant of the correlations with a loss
+COUPLED_SHARE = 0.05  # largest share of an error of one gyro in the turns about the other axes
 DAMPING_TOLERANCE = 0.2  # relative error of D away from trim
 N_FURTHER = 4  # after the regressors of a block: the bounded uncertainty, and the axis' row of D
 BLOCK_ROWS = (0, 0, 1)  # row of roll, pitch and yaw in the block that has the axis
@@ -82,21 +84,30 @@ def attitude_dtype(capacity: BlockCapacity) -> np.dtype:
         enabled=int, level=float,  # level of both sums, standard deviations
         D=(3, 3), R=float, a=n_a, b=float,  # 1/s; variance of v, rad2; factors per frame
         P_start=3, P=(3, 3, 3), F_P=(3, 3),  # P_start: diagonal of P at the start; F_P: the product F P
-        turn=3, A=3,  # rad: beyond the gyros' turn, in this frame and in all
+        turn=3, A=3,  # turn of the attitude beyond that of the gyros, rad: in this frame, and in all frames
         s=(3, 3), s_j=(3, n, 3), s_h=(3, n_h, 3),
         n=(int, 3), r=n, g_j=n, xi=3, z=(3, n_a), z_j=(3, n, n_a), N=(3, n_h), M=(3, n_h), R_j=(3, n_h, n),
-        score=float,  # the larger sum of the frame, over its level, or 0 if it is not filled
-        e_0=3, e_slope=3, tilt=float,  # of e_T: rad/s; share of the axis' rate; rad, of all rates
+        score=float,  # largest of the sums of both kinds, over their level; 0 in frames that do not need it
+        e_0=3, e_slope=3, tilt=float,  # parts of e_T: rad/s; share of the axis' rate; rad, times all rates
         T=(3, n_a), E=(3, n_a), T_std=n_a,
         turn_score=3, gyro=int,  # by axis, over the level; the axis whose gyro is broken, or -1
-        turn_max=float,  # of |T| with sound gyros, rad
+        turn_max=float,  # largest |T| that sound gyros explain, rad
     )  # fmt: skip
 
 
 def configure_attitude(att: np.void, D: np.ndarray, errors: SensorErrors, margin: float, dt_s: float) -> None:
-    """Fill the comparison; D (3, 3) 1/s. margin: difference of log-likelihood ratios that names a surface."""
+    """Fill the comparison at frames of dt_s; D (3, 3) 1/s. margin: difference of log-likelihood ratios that
+    names a surface, so the level of the sums is sqrt(2 margin) standard deviations.
+
+        std(T)^2 = 2 v^2 / (1 + a) + (w dt)^2 / (1 - a^2)
+        e_0 = steady + drift      tilt = e_phi + e_theta
+
+    v rad, w rad/s: largest noise of an angle and of a gyro. dA contains the change of an angle's noise, which
+    gives the first term, and dt times the noise of a gyro. steady: constant error of a gyro, rad/s; drift: of
+    the attitude, rad/s; e_phi, e_theta: constant errors of phi and theta, rad.
+    """
     angles, gyros = [errors[name] for name in ANGLES], [errors[name] for name in AXES]
-    v, w = max(each.random for each in angles), max(each.random for each in gyros)
+    v, w = max(angle.random for angle in angles), max(gyro.random for gyro in gyros)
     a = np.exp(-dt_s / np.array(LEAK_TIMES_S))
     drift = max(abs(getattr(errors.declared, name).drift_rad_s) for name in ANGLES)
     P_start = v**2, w**2, DRIFT_PRIOR_RAD_S2**2
@@ -104,14 +115,14 @@ def configure_attitude(att: np.void, D: np.ndarray, errors: SensorErrors, margin
         att, enabled=1, level=sqrt(2.0 * margin), gyro=-1, D=D, R=v**2, a=a, b=exp(-dt_s / LOSS_MEMORY_S),
         P_start=P_start, P=np.diag(P_start),
         T_std=np.sqrt(2.0 * v**2 / (1.0 + a) + (w * dt_s) ** 2 / (1.0 - a**2)),
-        e_0=[each.steady + drift for each in gyros], e_slope=[each.slope for each in gyros],
+        e_0=[gyro.steady + drift for gyro in gyros], e_slope=[gyro.slope for gyro in gyros],
         tilt=angles[0].steady + angles[1].steady,
     )  # fmt: skip
 
 
 @kernel
 def restart(att):
-    """Forget what was compared: the attitude shows no turn now."""
+    """Restart all filters and sums: near the vertical the attitude shows no turn."""
     att.turn[:] = att.A[:] = att.P[:] = 0.0
     att.s[:] = att.s_j[:] = att.s_h[:] = 0.0
     att.z[:] = att.z_j[:] = att.N[:] = att.M[:] = att.R_j[:] = 0.0
@@ -157,7 +168,8 @@ def sum_turns(att, x, dt):
         (|T| - E) / (T_std level)      T <- a T + dA      E <- a E + dt e_T
         e_T = e_0 + e_slope |x_i| + tilt (|x_0| + |x_1| + |x_2|)
 
-    x (3,) rad/s: measured rates. turn_max rad: the largest |T| that sound gyros explain.
+    x (3,) rad/s: measured rates. Also fill turn_max = max(E + T_std level), rad, over axes and leaks: the
+    largest |T| that sound gyros explain.
     """
     rates = abs(x[0]) + abs(x[1]) + abs(x[2])
     att.turn_max = 0.0
@@ -173,8 +185,11 @@ def sum_turns(att, x, dt):
 
 @kernel
 def find_gyro(att, worst):
-    """Fill `gyro`: the only axis about which the attitude does not turn as the gyro says, or -1. worst: the
-    axis with the largest `turn_score`."""
+    """Fill `gyro`: the axis whose gyro is broken, or -1. worst: the axis with the largest `turn_score`.
+
+    It is `worst` if the attitude does not turn as that gyro says (turn_score > 1), no sum shows a fault of a
+    surface (score <= 1), and no other axis turns by more than noise or the coupling (COUPLED_SHARE) explain.
+    """
     if att.turn_score[worst] > 1.0 >= att.score:
         att.gyro = worst
         for i in range(3):
@@ -184,36 +199,40 @@ def find_gyro(att, worst):
 
 @kernel
 def advance_axis(att, i, blk, row, eta, dt, detected):
-    """Advance filter, responses and sums of axis i, in this row of its block; N, M and R_j if `detected`.
+    """Advance filter, responses and sums of axis i, which is this row of its block.
 
         z <- a z + g / sqrt S      z_j <- a z_j + g_j / sqrt S
 
-    eta rad/s2: bound of its uncertainty.
+    N, M and R_j are added to once the rates have raised an alarm (`detected`). eta rad/s2: bound on the
+    uncertainty of the axis.
     """
-    D, a = att.D[i, i], blk.a
+    D, a_d = att.D[i, i], blk.a
     att.A[i] += att.turn[i]
     att.turn[i] = 0.0
     u = fill_known(att, i, blk, row, eta)
     K, S = advance_P(att, i, blk, row, dt)
     std = np.sqrt(S)
-    g = respond(att.s[i], att.A[i], u, D, a, K, dt) / std
+    g = respond(att.s[i], att.A[i], u, D, a_d, K, dt) / std
     leak(att.z[i], att.a, g)
     for j in range(att.n[i]):
-        att.g_j[j] = respond(att.s_j[i, j], 0.0, att.r[j], D, a, K, dt) / std
+        att.g_j[j] = respond(att.s_j[i, j], 0.0, att.r[j], D, a_d, K, dt) / std
         leak(att.z_j[i, j], att.a, att.g_j[j])
     for h, hypothesis in enumerate(blk.hypothesis[: blk.n_h]):
         if hypothesis.kind == LOSS:
-            g_s = respond(att.s_h[i, h], 0.0, hypothesis.signature[row], D, a, K, dt) / std
+            g_s = respond(att.s_h[i, h], 0.0, hypothesis.signature[row], D, a_d, K, dt) / std
             if detected:
                 correlate(att, i, h, g_s, g)
 
 
 @kernel
 def fill_known(att, i, blk, row, eta):
-    """Fill the n known accelerations r of axis i, rad/s2, and return the input u of its filter, rad/s2:
+    """Fill the known accelerations r (n,) of axis i, rad/s2, and their number n; return the input u of its
+    filter, rad/s2:
 
-    r = (regressors of the block, eta, D_i0 xi_0, D_i1 xi_1, D_i2 xi_2)
-    u = -nu - sum_j D_ij xi_j,  j != i
+        r = (regressors of the block, eta, D_i0 xi_0, D_i1 xi_1, D_i2 xi_2)
+        u = -nu - sum_j D_ij xi_j,  j != i
+
+    eta rad/s2: bound on the uncertainty; xi (3,) rad/s: of the frame before.
     """
     n = blk.n_Z
     att.n[i] = n + N_FURTHER
@@ -242,7 +261,8 @@ def correlate(att, i, h, g_s, g):
 
 @kernel
 def tol(blk, j, n):
-    """tol_j of constant j of n: of a coefficient, of the bounded uncertainty, or of the damping."""
+    """tol_j of constant j of n: of a coefficient as in the block, then 1 of the bounded uncertainty, whose
+    r_j is its bound, then DAMPING_TOLERANCE of the damping by the three rates."""
     k = j - n + N_FURTHER
     if k < 0:
         return blk.tol[j]
@@ -251,9 +271,9 @@ def tol(blk, j, n):
 
 @kernel
 def largest_sum(att, blk, i):
-    """The largest leaky sum of axis i that no constant explains, over the level:
+    """The part of the leaky sums of axis i that no constants explain, largest over the leaks, over the level:
 
-    (|z| - sum_j tol_j |z_j|) sqrt(1 - a^2) / level
+    max (|z| - sum_j tol_j |z_j|) sqrt(1 - a^2) / level
     """
     largest = 0.0
     n = att.n[i]
@@ -267,12 +287,14 @@ def largest_sum(att, blk, i):
 
 @kernel
 def largest_correlation(att, blk, first):
-    """The largest correlation with a loss that no constant explains, over the level, of a block: pitch (first
-    axis 1), or roll and yaw (0).
+    """The part of the correlations with losses that no constants explain, largest over the losses of a block,
+    over the level:
 
-        (|N| - sum_j tol_j |R_j|) / sqrt M      N, M, R_j: sums over the axes of the block
+        max (|N| - sum_j tol_j |R_j|) / (level sqrt M)
 
-    R_j of an uncertainty or a damping is a sum of absolute values: each axis has a constant of its own.
+    N, M, R_j: sums over the axes of the block, which are first, first + 2, ...: pitch (first 1), or roll and
+    yaw (first 0). For the uncertainty and the damping, |R_j| is the sum of the axes' magnitudes: each axis
+    has a constant of its own.
     """
     largest = 0.0
     n = att.n[first]
@@ -295,14 +317,14 @@ def largest_correlation(att, blk, first):
 
 
 @kernel
-def respond(s, A, u, D, a, K, dt):
+def respond(s, A, u, D, a_d, K, dt):
     """Advance a state s (psi, xi, d) by one frame of acceleration u, rad/s2, and measurement A, rad; return
     the innovation g, rad:
 
-        psi <- psi + dt xi      xi <- xi + dt (d + u - D xi)      d <- a d
+        psi <- psi + dt xi      xi <- xi + dt (d + u - D xi)      d <- a_d d
         g = A - psi             s <- s + K g
     """
-    psi, xi, d = s[0] + dt * s[1], s[1] + dt * (s[2] + u - D * s[1]), a * s[2]
+    psi, xi, d = s[0] + dt * s[1], s[1] + dt * (s[2] + u - D * s[1]), a_d * s[2]
     g = A - psi
     s[0], s[1], s[2] = psi + K[0] * g, xi + K[1] * g, d + K[2] * g
     return g
@@ -318,10 +340,10 @@ def dot(a, b):
 def advance_P(att, i, blk, row, dt):
     """Advance P of axis i by a frame of dt s; row: of the axis in its block. Return K (3,) and S, rad2.
 
-        P <- F P F' + Q,  F = [1 dt 0; 0 1 - dt D dt; 0 0 a],  Q = diag(0, dt^2 Q_x, dt Q_d)
+        P <- F P F' + Q,  F = [1 dt 0; 0 1 - dt D dt; 0 0 a_d],  Q = diag(0, dt^2 Q_x, dt Q_d)
         S = P_00 + R,  K = P_0 / S      P <- P - K P_0'      P_0: the first column, and row, of P
 
-    Q_x (rad/s2)2, Q_d (rad/s2)2/s, a: noise of the rate, of the drift, and decay of the drift in the block.
+    Q_x (rad/s2)2, Q_d (rad/s2)2/s: noise of the rate and of the drift in the block; R rad2: variance of v.
     """
     P, F_P = att.P[i], att.F_P
     F = (1.0, dt, 0.0), (0.0, 1.0 - dt * att.D[i, i], dt), (0.0, 0.0, blk.a)

@@ -74,16 +74,19 @@ from beaver_ftc.diagnosis.state import PITCH, SIDE_FORCE
 from beaver_ftc.scenario.declared import SensorErrors
 from beaver_ftc.scenario.sensors import NOISE_LIMIT_SIGMA
 
-# What is subtracted from the innovation of the rates: nothing; the gust of the rates' blocks; that of the
-# views, by vanes; that by accelerometers alone. With the last the forces are those at the flow angle from
-# inertial motion, and the rates do not count.
+# Sources, that is, what is subtracted from the innovation of the rates:
+#     RAW         nothing
+#     RATES       the gust estimate of the blocks of the rates
+#     VANED       the gust estimate of the views, by vanes
+#     VANELESS    the gust estimate by accelerometers in place of vanes
+#     INERTIAL    for views of a force alone, at the flow angle from inertial motion: the rates do not count
 RAW, RATES, VANED, VANELESS, INERTIAL = range(5)
 MAX_COLUMNS = MAX_TERMS + N_INPUT_READINGS + 2 * (MAX_FORCE_REGRESSORS + 1)
-# Time between force and flow of one instant in JSBSim, at most; 0.001 was measured.
+# Largest time between the force and the flow of one instant in JSBSim; 0.001 s was measured.
 MAX_FORCE_LAG_S = 0.002
-MIN_GYRO_STD_RAD_S = 1e-9  # of an exact gyro: with a variance of 0 the filters' S would be singular
-# The mapped error outside the map for filters with a covariance, whose noise is 1e-4: above the acceleration
-# of any aircraft.
+MIN_GYRO_STD_RAD_S = 1e-9  # noise of an exact gyro: with a variance of 0 the filters' S would be singular
+# Mapped error that the filters assume outside the map. It is larger than the acceleration of any aircraft,
+# and small enough for a covariance beside a noise of 1e-4.
 OFF_MAP_RAD_S2 = 100.0
 _SIDE_ROW = FORCES.index("CY")
 _READING_OF = {"alpha": ALPHA, "beta": BETA, "V": AIRSPEED, "qdyn": QDYN}
@@ -92,35 +95,38 @@ _DPT = RH + 1  # the first of the declared signals
 
 # The noise model: accelerations that are not caused by a fault.
 NOISE_RECORD = record(
-    # of the drift that represents a bounded uncertainty, over bound squared, 1/s
+    # intensity of the drift that represents a bounded uncertainty, over the bound squared, 1/s
     q=float,
     # share of its bound by which the uncertainty changes in a frame if no surface moves
     rate0=float,
     G_trim=(3, MAX_SURFACES),  # magnitude of the effect of each surface in trim, rad/s2 per rad
-    # variance by noise of all inputs of the model; without the air data; (rad/s2)2
+    # variance by noise of all inputs of f + G u and of the gust estimate, and without the air data, (rad/s2)2
     Q=3, Q0=3,
-    # whether errors of the air data count; their noise, units of the readings
+    # whether errors of the air data count; deviation of their noise, in units of the readings
     noisy=int, sigma=N_INPUT_READINGS,
-    # scratch
+    # intermediate results of `add_constants`
     zC=MAX_TERMS, ds=N_SIGNALS, dm=MAX_MONOMIALS, C=(3, MAX_COLUMNS),
 )  # fmt: skip
 
 ROWS_RECORD = record(
-    nu=(5, N_ROWS), std=(5, N_ROWS),  # for each of what may be subtracted
-    # bound on the uncertainty, now: with surfaces as commanded; with one of them anywhere in its travel
+    nu=(5, N_ROWS), std=(5, N_ROWS),  # by source: RAW to INERTIAL
+    # bound on the uncertainty now: with surfaces as commanded, and with one of them anywhere in its travel
     eta=(2, N_ROWS), R=N_ROWS,
-    # effect of a surface, and of an error of the side and the other vane, per rad; bound on its error
+    # G: effect of each surface, then of an error of the side vane and of the other vane, per rad; e_G: bound
+    # on the error of G
     G=(MAX_SURFACES + 2, N_ROWS), e_G=(MAX_SURFACES + 2, N_ROWS), Gu=(MAX_SURFACES, N_ROWS),
-    per_cubed=float,  # pitch acceleration of a coefficient 1 of alpha^3
-    n=int, first=(int, 2),  # columns of the rates, 0 if no constant counts; the first of each force
+    per_cubed=float,  # pitch acceleration by a coefficient of 1 of alpha^3
+    n=int, first=(int, 2),  # columns of the rates, 0 if no constant counts; first column of each force
     tol=MAX_COLUMNS, Z=(MAX_COLUMNS, N_ROWS),
 )  # fmt: skip
 
 
 def configure_rows(stat: np.void, errors: SensorErrors, tol: np.ndarray, err: np.void) -> None:
-    """Fill what the rates have of errors: tolerances tol of the coefficients, and of the readings; noise.
+    """Fill the errors of the rates: R of the gyros, tolerances and noise of the air data, and the numbers n
+    and `first` of the columns.
 
-    err: of `errors_dtype`.
+    tol (terms,): tolerances of the coefficients of the moments; err: declared errors, of `errors_dtype`. The
+    readings of the air data count (`noisy`) if one of them has an error.
     """
     rows = stat["rows"]
     noise = stat["noise"]
@@ -131,7 +137,8 @@ def configure_rows(stat: np.void, errors: SensorErrors, tol: np.ndarray, err: np
     of_readings, sigma = rows["tol"][n : n + N_INPUT_READINGS], noise["sigma"]
     for name, j in _READING_OF.items():
         of_readings[j], sigma[j] = errors[name].steady, errors[name].random
-    of_readings[_KW_READING] = err["kw0"]  # all of it: so many standard deviations are part of that
+    # kw0 bounds the whole error of the power, so the noise is that over the standard deviations in a bound.
+    of_readings[_KW_READING] = err["kw0"]
     sigma[_KW_READING] = err["kw0"] / NOISE_LIMIT_SIGMA
     noise["noisy"] = of_readings.any() or sigma.any()
     rows["n"] = n + noise["noisy"] * N_INPUT_READINGS if noise["noisy"] or tol.any() else 0
@@ -139,9 +146,11 @@ def configure_rows(stat: np.void, errors: SensorErrors, tol: np.ndarray, err: np
 
 @kernel
 def fill_signal_slopes(tab, err, y, j, ds):
-    """Fill ds (N_SIGNALS,), the change of the table's signals per unit of reading j.
+    """Fill ds (N_SIGNALS,), the change of the table's signals s per unit of reading j of the air data:
 
-    ds_j = 1 (vanes)      ds_k = -s_k / V (normalised rates, by V)      ds_dpt by V, qdyn and kW
+        alpha, beta         ds_j = 1
+        V                   ds_k = -s_k / V for the normalised rates k, and that of dpt
+        qdyn, kW            that of dpt (`slipstream_slopes`), if the engine has instruments
     """
     ds[:] = 0.0
     if j < AIRSPEED:  # a vane
@@ -155,12 +164,17 @@ def fill_signal_slopes(tab, err, y, j, ds):
 
 @kernel
 def add_constants(w, noise, rows, err, model, meas, u):
-    """Add an instant, w of the frame, to Z of the rates, rad/s2 per unit; and fill Q as it is now.
+    """Add an instant, which is the share w of the frame, to Z of the rates, rad/s2 per unit of each constant;
+    fill Q as it is at this instant.
 
-        Z_c <- Z_c + w dF_c      Q = Q0 + sum_j (dF_j sigma_j)^2,  j: readings      dF: acceleration by C
+        Z_c <- Z_c + w dF_c      Q = Q0 + sum_j (dF_j sigma_j)^2,  j: readings
 
-    C (3, n): the coefficients of the moments per unit of each constant: the term's monomial, with the
-    deflection of its surface; for reading j, sum C dm + [j is qdyn] sum C m / q.
+    dF (3, n): acceleration by the moments C (3, n), whose column c is per unit of constant c. For a
+    coefficient that is its monomial, times the deflection of its surface, if it has one. For reading j it is
+
+        sum_k C_k dm_k      qdyn: + sum_k C_k m_k / qdyn      C_k, m_k: coefficients and monomials
+
+    with dm the change of the monomials by ds (`fill_signal_slopes`).
     """
     y, tab, C, n = meas.y, model.moments, noise.C, rows.n
     if n == 0:
@@ -191,10 +205,12 @@ def add_constants(w, noise, rows, err, model, meas, u):
 
 @kernel
 def begin_rows(w, noise, rows, bound, model, meas, u):
-    """Begin the rows of the next frame at this instant: constants, eta, and the noise that the blocks take.
+    """Begin the rows of the next frame at this instant, which is the share w of it: Z, eta and std[RATES].
 
     eta[0] = published bound + |G| du + min(mapped error, OFF_MAP_RAD_S2)
     eta[1] = eta[0], and, if one surface may be anywhere, the further error of the map over the whole travel
+
+    |G| in trim; du rad: bounds on the deflections.
     """
     eta = rows.eta[0]
     emap = bound.error_map
@@ -219,8 +235,9 @@ def finish_rows(rows, noise, forces, gust, of_views, vaneless, bound, means, nu,
 
         rows.nu[source] = nu - acc_mean of the gust estimate that the source subtracts, RAW: none
 
-    gust, of_views, vaneless: the estimates that RATES, VANED and VANELESS subtract. per_cubed: see
-    ROWS_RECORD. Effects of surfaces are those with G of the frame before.
+    gust, of_views, vaneless: the estimates that RATES, VANED and VANELESS subtract. means: of the prediction;
+    G and Gu of surfaces are with the effects of the frame before (see `predict_force`). per_cubed: see
+    ROWS_RECORD.
     """
     rows.per_cubed = per_cubed
     for i in range(3):
@@ -245,7 +262,8 @@ def update_forces(rows, forces, gust, du, meas, u, dt):
 
     u (n,) rad: surfaces; du (n,) rad: bounds on their errors; f_hat' rad/s3: rate of change of the force.
 
-    At the first instant the rate of sideslip of the run before is not known; that of this instant is used.
+    The order matters: the force uses the flow's rates of the instant before, so `fill_angle_rates` comes
+    last. At the first instant those are not known; the rates of this instant are used.
     """
     if forces.n_seen == 0:
         fill_angle_rates(forces, gust.config.gravity, meas)
@@ -269,11 +287,13 @@ def update_forces(rows, forces, gust, du, meas, u, dt):
 
 @kernel
 def fill_force_row(rows, forces, f, r, qdyn):
-    """Fill nu and std of row r, of the force f, with each of what may be subtracted from the rates:
+    """Fill nu and std of row r, of the force f, for every source:
 
         nu = e      std^2 = var_trim q_ratio^2 + (f_hat q_noise / qdyn)^2 + var_acc
 
-    var_trim: with the noise of the vane; with INERTIAL, which reads no vane, without it. qdyn Pa.
+    var_trim: with the noise of the vane, but for INERTIAL, which reads no vane; q_noise, qdyn Pa: noise and
+    value of the dynamic pressure; var_acc: by the accelerometer. For INERTIAL, `update_forces` then replaces
+    nu.
     """
     by_q = f.f_hat * forces.q_noise / qdyn
     for source in range(INERTIAL + 1):
@@ -305,12 +325,14 @@ def predict_force(rows, forces, f, gust, i, meas, u):
 
 @kernel
 def add_terms(rows, forces, f, gust, i, meas, u):
-    """Fill the columns of the terms of force i, and the effects of surfaces with the bounds on their errors;
-    return f_hat.
+    """Fill the columns of the terms of force i, and the effects G of surfaces with the bounds e_G on their
+    errors; return the predicted force f_hat, rad/s2.
 
-        f_hat = sum C_k Z_k,  Z_k = per_C monomial_k u_s,  per_C = qdyn S / m c
+        f_hat = sum_k C_k Z_k      Z_k = per_C monomial_k [u_s]      per_C = qdyn S / m c
+        G_s = sum_k C_k per_C monomial_k      e_G_s = sum_k tol_k |per_C monomial_k|      k: terms in u_s
 
-    The last of the side force is the term in the rate of sideslip, f_bdot. Column c + k is that of term k.
+    The column of term k is c + k. After the terms of the side force comes that in the rate of sideslip,
+    f_bdot, which is added to f_hat, too.
     """
     table = gust.memory.table
     r = SIDE_FORCE + i
@@ -346,7 +368,7 @@ def set_columns(b: np.void, rows: np.void, columns: list[int]) -> None:
 
 @kernel
 def projection(m, i, X, k, size=False):
-    """m_i X_k, row k of X (K, 5) in direction i of m (2, 5); |m_i| X_k if X is of sizes."""
+    """m_i X_k, row k of X (K, 5) in direction i of m (2, 5); |m_i| X_k if the rows of X are a `size`."""
     return project(row_of(m, i), row_of(X, k), size)
 
 
@@ -356,8 +378,8 @@ def project_rows(b, rows):
 
         nu = m nu,  Q_x = (|m| std)^2,  eta = |m| eta,  R_y = m^2 R,  signature = m Gu_s,  regressor_j = m Z_j
 
-    The signature of a moment in alpha^3 is m per_cubed in pitch; those of the other hypotheses without a
-    surface stay.
+    The signature of a moment in alpha^3 is m per_cubed in pitch. Other hypotheses without a surface keep
+    their signature.
     """
     m, source = b.m, b.source
     for i in range(b.n):

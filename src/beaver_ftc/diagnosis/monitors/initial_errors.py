@@ -383,7 +383,7 @@ def fill_effects(mon, y_now):
 def tighten_bounds(mon):
     """Lower the bound on each error to what the tests allow, for each pole m and each row of EVIDENCE:
 
-        E <- min(E, s / (EFFECT_LEFT c)) if c > 0,    s^2 = sum over the row's tests of (r_m + B_m + 2 d H_m)^2
+        E <- min(E, s / (EFFECT_LEFT c)) if c > 0,    s^2 = sum over the tests of (r_m + B_m + 2 d H_m)^2
 
     d: while the filter summed the effect, the error was up to d larger or smaller than the present one. c is
     |C_m|, and s as above, but for these rows:

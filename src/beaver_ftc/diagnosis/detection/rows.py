@@ -148,9 +148,9 @@ def configure_rows(stat: np.void, errors: SensorErrors, tol: np.ndarray, err: np
 def fill_signal_slopes(tab, err, y, j, ds):
     """Fill ds (N_SIGNALS,), the change of the table's signals s per unit of reading j of the air data:
 
-        alpha, beta         ds_j = 1
-        V                   ds_k = -s_k / V for the normalised rates k, and that of dpt
-        qdyn, kW            that of dpt (`slipstream_slopes`), if the engine has instruments
+    alpha, beta         ds_j = 1
+    V                   ds_k = -s_k / V for the normalised rates k, and that of dpt
+    qdyn, kW            that of dpt (`slipstream_slopes`), if the engine has instruments
     """
     ds[:] = 0.0
     if j < AIRSPEED:  # a vane

@@ -26,7 +26,7 @@ Symbols of the kernels:
     E, T rad/s                residual of a filter and its threshold
     e rad/s                   the part of T that has a memory, T_eta + T_n
     n rad/s                   bound on the changing part of a gyro's error (`bounds.n_gyro`)
-    a, m, i                   decay per frame, filter, axis
+    a, m, i                   decay per frame; number of a filter; axis
     fie; h, Z, r rad/s2       isolation estimator; its fault h + theta Z +- r (EFFECT_RECORD of isolation.py)
     lo, hi                    ends of an interval: of theta, of a residual, of the acceleration by a fault
     bank, bound               records: BANK_RECORD, `bound_dtype`
@@ -97,8 +97,10 @@ BANK_RECORD = record(
 
 
 def poles_for_delays(errors: SensorErrors, b: float) -> tuple[float, ...]:
-    """Poles, 1/s, that find the smallest constant fault within each of POLE_DELAYS_S, despite gyro noise;
-    none without noise. b rad/s2: largest constant bound on the error of the model."""
+    """Poles, 1/s: for each of POLE_DELAYS_S the pole that detects the smallest constant fault within this
+    delay, despite gyro noise. Without noise there are none. b rad/s2: largest constant bound on the error of
+    the model.
+    """
     n_bar = 2 * NOISE_LIMIT_SIGMA * float(errors.each("noise", AXES).max())
     return tuple(_pole_for_delay(tau, n_bar, b) for tau in POLE_DELAYS_S) if n_bar > 0 else ()
 
@@ -120,14 +122,16 @@ def _pole_for_delay(tau: float, n_bar: float, b: float) -> float:
 
 
 def filter_poles(config: FdiConfig, declared: Declared) -> tuple[float, ...]:
-    """The filters' poles, 1/s, the published one first; those for noise only as far as there is room."""
+    """The filters' poles, 1/s: the published one, those of the scenario, then those that noise requires, as
+    far as the MAX_POLES allow.
+    """
     for_noise = poles_for_delays(declared.sensors, max(declared.constant_rad_s2))
     others = (*config.pole_bank_per_s, *for_noise) if config.sharpen.pole_bank else ()
     return (config.detection_pole_per_s, *others)[:MAX_POLES]
 
 
 def configure_bank(bank: np.void, config: FdiConfig, declared: Declared, dt: float) -> None:
-    """Fill in the filters' decays, from the poles of the scenario and those that noise requires."""
+    """Fill the number of filters and their decays a = exp(-lam dt); dt s."""
     poles = filter_poles(config, declared)
     bank["config"]["n_filters"] = len(poles)
     bank["config"]["a"][: len(poles)] = [exp(-lam * dt) for lam in poles]
@@ -172,7 +176,8 @@ def bank_axis(bank):
 
 @kernel
 def alarm_axis(bank, authority, alarm):
-    """The axis on which a detector in authority raises the alarm, or -1; alarm: ALARM_RECORD."""
+    """The axis of the alarm, or -1: that of the bank, else that of the statistical detector, as far as
+    `authority` lets each raise an alarm; alarm: ALARM_RECORD of the statistical detector."""
     axis = bank_axis(bank) if authority != STATISTICAL_DETECTOR else -1
     if axis < 0 and authority != WORST_CASE_DETECTOR and alarm.ratio > 1.0:
         axis = alarm.axis
@@ -188,30 +193,33 @@ def filter_share(bank, m, i):
 
 @kernel
 def nearest_filter(bank, i):
-    """The filter that is nearest to its bound on axis i: the one the alarm comes from, if there is one."""
-    nearest, best = 0, 0.0
+    """The filter whose |E| / T is largest on axis i; if there is an alarm on this axis, it is of this one."""
+    nearest, largest = 0, 0.0
     for m in range(bank.config.n_filters):
         share = filter_share(bank, m, i)
-        if share > best:
-            nearest, best = m, share
+        if share > largest:
+            nearest, largest = m, share
     return nearest
 
 
 @kernel
 def bank_share(bank):
-    """The largest |E| / T in the bank."""
-    best = 0.0
+    """The largest |E| / T in the bank, over filters and axes."""
+    largest = 0.0
     for i in range(3):
-        best = max(best, filter_share(bank, nearest_filter(bank, i), i))
-    return best
+        largest = max(largest, filter_share(bank, nearest_filter(bank, i), i))
+    return largest
 
 
 @kernel
 def fault_range(fie, i):
     """(lo, hi), the least and greatest acceleration by the fault on axis i, or along its parity direction if
-    i = 3, rad/s2; 0 covers the frames before the fault:
+    i = 3, rad/s2:
 
-        lo = min(0, h + theta_min Z, h + theta_max Z) - r      hi = max(0, ...) + r
+        lo = min(0, h + theta_min Z, h + theta_max Z) - r
+        hi = max(0, h + theta_min Z, h + theta_max Z) + r
+
+    The 0 is for the frames before the fault.
     """
     phi, m = fie.effect, fie.parity_direction
     h, Z = along(phi.h, m, i, False), along(phi.Z, m, i, False)
@@ -238,10 +246,10 @@ def advance_reach(bank, fie, dt):
 
 @kernel
 def is_reachable(bank, fie, shared):
-    """True if L - T <= E <= U + T for each filter and axis that is not skipped.
+    """True if L - T <= E <= U + T for each filter and each axis that the estimator does not skip.
 
-    shared: the axes share one parameter; the residual along the parity direction m is then tested as well,
-    m' E with the threshold |m|' T.
+    shared: the axes share one parameter. Then the residual along the parity direction m, m' E with the
+    threshold |m|' T, must satisfy this as well.
     """
     for m in range(bank.config.n_filters):
         for i in range(4):

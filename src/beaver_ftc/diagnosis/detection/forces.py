@@ -16,8 +16,8 @@ rate of the run before.
 
 forces_design.py fills the records from what a scenario declares.
 
-Letters of the kernels. i is the force, f its record, k a term or an axis, s a surface; a force over m c,
-like e, is in rad/s2.
+Letters of the kernels. i is the number of the force, f its record (FORCE_RECORD), k a term or an axis, s a
+surface. Forces are over m c, like e, and so in rad/s2.
 
     e, f_hat       innovation; force of the model
     per_C          qdyn S / m c: e of a coefficient of one
@@ -41,8 +41,8 @@ from beaver_ftc.scenario.sensors import ACCELEROMETERS
 
 
 class Force(NamedTuple):
-    """A force: its coefficient; the vane of its flow angle, in y and by name; the axis about which that angle
-    turns the aircraft; its accelerometer."""
+    """A force: its coefficient; the place in y and the name of the vane that measures its flow angle; the
+    axis about which that angle turns the aircraft; its accelerometer."""
 
     coefficient: str
     vane: int
@@ -51,16 +51,17 @@ class Force(NamedTuple):
     accelerometer: str
 
 
-SIDE_INDEX, NORMAL_INDEX = range(2)  # across the body, and normal to it
+SIDE_INDEX, NORMAL_INDEX = range(2)  # numbers of the forces across the body, and normal to it
 MEASURED_FORCES = (
     Force("CY", BETA, "beta", YAW, ACCELEROMETERS[1]),
     Force("CZ", ALPHA, "alpha", PITCH, ACCELEROMETERS[2]),
 )
 FORCE_NAMES = tuple(force.coefficient for force in MEASURED_FORCES)
 VANES = tuple(force.vane for force in MEASURED_FORCES)
-VANE_E = 1  # in `vane` of a force: the place of e
-MIN_UPDATES = 2  # from the second one on the rate of sideslip of the run before is known
-# The rate of sideslip, the bias of the accelerometer and the force as a whole come last.
+VANE_E = 1  # place of e in `vane` of FORCE_RECORD
+# A force counts from its second update on: only then the rate of sideslip of the run before is known.
+MIN_UPDATES = 2
+# Columns of a force: its terms, the rate of sideslip, the bias of the accelerometer, the force as a whole.
 MAX_FORCE_REGRESSORS = MAX_TERMS_OF_ONE + 3
 
 FORCE_RECORD = record(
@@ -69,21 +70,22 @@ FORCE_RECORD = record(
     e_drift=float,  # e per rad/s of the drift of that angle
     Q_e=float,  # intensity of the drift of e at that angle by errors and gusts, (rad/s2)2/s
     G=MAX_SURFACES,  # e per rad of each surface, now
-    # of an error of the vane, per rad: angular acceleration and e, angular acceleration in roll
+    # effects of an error of the vane, per rad: vane: on the axis of the force, and on e; vane_roll: on roll
     vane=2, vane_roll=float,
     var_trim=2,  # variance of f_hat in trim by noise, with that of the vane and without it, (rad/s2)2
     L=3, f_hat=float,
     G_trim=MAX_SURFACES,  # magnitude of e by each surface in trim, per rad
-    var_acc=float,  # variance of e by noise of the accelerometer; independent of the pressure
-    n_Z=int,  # its columns in rows.py, without that of the drift
+    var_acc=float,  # variance of e by noise of the accelerometer, which does not change with the pressure
+    n_Z=int,  # number of its columns in rows.py, without that of the drift
 )  # fmt: skip
 FORCES_RECORD = record(
     in_use=int, c_inv=float,  # whether forces are used; one over the chord, 1/m
-    q_trim=float, q_noise=float, q_ratio=float,  # dynamic pressure: in trim, noise, Pa; over that in trim
+    # dynamic pressure in trim, and its noise, Pa; dynamic pressure now over that in trim
+    q_trim=float, q_noise=float, q_ratio=float,
     # coefficient of the rate of sideslip; rates of sideslip and incidence of the instant before, rad/s
     CY_bdot=float, angle_rate=2,
     n_seen=int,  # updates so far, up to MIN_UPDATES
-    gust_noise=3,  # noise of the gust estimate from forces, rad/s2
+    gust_noise=3,  # deviation of the acceleration that is computed from the gust by forces, rad/s2
     y_free=N_Y, component=(FORCE_RECORD, 2),
 )  # fmt: skip
 
@@ -94,7 +96,9 @@ def fill_vaneless_y(forces, w, y):
 
         y_free = y - (e / q_ratio + L' w) / e_vane      e_vane = vane[VANE_E]: e per rad of the vane's error
 
-    w (3,) rad/s: rotation of the air in body axes. The aircraft turns at x - w against it: e = -L' w.
+    The equation is for the two vanes, with the force of each. w (3,) rad/s: rotation of the air in body axes.
+    The aircraft turns at x - w relative to the air, so e / q_ratio contains -L' w, which is no effect of the
+    angle.
     """
     forces.y_free[:] = y
     for i, f in enumerate(forces.component):
@@ -114,15 +118,17 @@ def drop_forces(forces, gust, vaneless, vaned):
 def update_inertial(forces, f, i, y, dt):
     """Integrate the flow angle of a vane from inertial motion, and return the innovation of force i at it.
 
-        angle <- angle + dt angle_rate      returned: e - slope (y - angle)      e_drift = sum dt slope
+        angle <- angle + dt angle_rate      e_drift <- e_drift + dt slope
+        returned: e - slope (vane - angle)
 
-    y (5,): readings, of which y is the vane's, rad; slope rad/s2 per rad: e of an error of the vane.
+    y (5,): readings; vane rad: that of the force's vane, from which the angle starts; slope rad/s2 per rad:
+    e of an error of the vane.
     """
-    angle = y[VANES[i]]
+    vane = y[VANES[i]]
     slope = f.vane[VANE_E] * forces.q_ratio
-    f.angle = f.angle + dt * forces.angle_rate[i] if forces.n_seen else angle
+    f.angle = f.angle + dt * forces.angle_rate[i] if forces.n_seen else vane
     f.e_drift += dt * slope
-    return f.innovation - slope * (angle - f.angle)
+    return f.innovation - slope * (vane - f.angle)
 
 
 @kernel
@@ -134,8 +140,8 @@ def fill_angle_rates(forces, g, meas):
         alpha' = q - tan(beta) (p cos(alpha) + r sin(alpha))
                  + (a_z cos(alpha) - a_x sin(alpha)) / (V cos(beta))
 
-    a (3,) m/s2: accelerometers, and gravity g, m/s2, in body axes; p, q, r rad/s: rates; V m/s: airspeed;
-    c, s: cosine and sine of alpha.
+    a (3,) m/s2: reading of the accelerometers plus gravity, of size g m/s2, in body axes; p, q, r rad/s:
+    rates; V m/s: airspeed; c, s: cosine and sine of alpha.
     """
     a, V, beta = meas.force, meas.y[AIRSPEED], meas.y[BETA]
     p, q, r = meas.x[0], meas.x[1], meas.x[2]
@@ -150,5 +156,5 @@ def fill_angle_rates(forces, g, meas):
 
 
 def terms_of_force(aircraft: Aircraft, i: int) -> list[Term]:
-    """The terms of force i, as `rows.predict_force` goes through them."""
+    """The terms of force i, in the order of their columns (`rows.add_terms`)."""
     return [term for term in aircraft.measurable_forces if term.coefficient == FORCE_NAMES[i]]

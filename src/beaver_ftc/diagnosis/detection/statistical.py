@@ -16,7 +16,8 @@ Symbols of the kernels:
     dt s, k                       duration and number of the frame
     b, m, h, v                    block and its number, hypothesis, view
     s; i, j                       surface; axes of a block
-    fies, of (n,)                 isolation estimators; number e of that of each surface's loss, or -1
+    fies                          isolation estimators
+    loss_number (n,)              number e of the estimator of each surface's loss, or -1
     lo, hi                        bounds on a log-likelihood ratio: places LO and HI of a pair
     stat                          the record of the detector, of `statistical_dtype`
     cfg, noise, gust, bound       records of the tests, the noise model, the gust estimate, the bounds
@@ -61,14 +62,14 @@ from beaver_ftc.diagnosis.gusts import (
 )
 from beaver_ftc.diagnosis.state import DAMAGE_EXCLUDES, LOSS
 
-# Least share of the best log-likelihood ratio that a constant theta explains of a loss growing at any rate
-# (docs/explanation/statistical.md).
+# A loss that grows at any rate has, as a loss of constant theta, at least this share of its log-likelihood
+# ratio (docs/explanation/statistical.md).
 MIN_LLR_SHARE = 0.25
-# The error of a model moves from one end of its bound to the other, by 2 bounds, within a frame at most, and
-# no faster than a surface moves by a quarter of its travel.
+# In a frame, the error of a model moves at most from one end of its bound to the other, by 2 bounds. For this
+# a surface must move by a quarter of its travel.
 MAX_ETA_RATE = 2.0
 BOUNDS_PER_TRAVEL = 8.0
-MIN_TRAVEL_RAD = 1e-6
+MIN_TRAVEL_RAD = 1e-6  # lower limit of a travel that divides
 LO, HI = 0, 1
 
 # Configuration of the tests.
@@ -76,13 +77,13 @@ TESTING_RECORD = record(
     enabled=int,
     alarm_level=float, margin=float,  # standard deviations; difference of log-likelihood ratios
     forget=float,  # factor by which evidence decays per frame after the alarm
-    n_scores=int,
+    n_scores=int,  # number of columns of `share` in ALARM_RECORD that are logged
     w=float,  # one over the number of instants in a frame
-    mapped=int,  # if the error is mapped and no surface can be lost
+    mapped=int,  # whether the model's error is mapped and no surface can be lost
 )  # fmt: skip
 
-# Output of the detector: largest score over the alarm level and its axis; time of the first alarm, s, or -1.
-# share: n_scores of the log, of losses, then of steps.
+# Output of the detector. ratio, axis: largest score over the alarm level, and its axis; detected_at_s: time
+# of the first alarm, s, or -1; share: scores over the alarm level, by loss, then by axis of a step.
 ALARM_RECORD = record(ratio=float, axis=int, detected_at_s=float, share=MAX_SURFACES + len(AXES))
 
 
@@ -99,9 +100,10 @@ def statistical_dtype(size: StatisticalSize = USUAL_SIZE) -> np.dtype:
 
 @kernel
 def update_blocks(stat, dt, k, alarmed, may_end=False):
-    """Update the blocks with frame k: each whitens what it sees of the rows, and tests it.
+    """Update the blocks with frame k: each projects the rows on its axes, whitens them and tests them.
 
-    alarmed: the detector has raised its alarm; may_end: a loss may end.
+    alarmed: the detector has raised its alarm, so evidence decays and no onset restarts; may_end: a loss may
+    end.
     """
     cfg = stat.test
     gust = stat.gust
@@ -127,9 +129,10 @@ def update_blocks(stat, dt, k, alarmed, may_end=False):
 
 @kernel
 def filter_known(blocks, gust, nu, dt):
-    """Whiten nu (3,), the innovation after known faults; the state x_known tracks its slowly varying mean.
+    """Whiten nu (3,), the innovation after known faults, less the effect of the measured gust. The state
+    x_known of each block tracks its slowly varying mean.
 
-    The whitened innovation replaces the `nu` of each block.
+    The whitened innovation replaces the `nu` of each block, which the next frame fills again.
     """
     for b in blocks[: likelihood.REVERTING_BLOCK]:
         for i, axis in enumerate(b.axes[: b.n]):
@@ -139,7 +142,7 @@ def filter_known(blocks, gust, nu, dt):
 
 @kernel
 def fill_unmodelled(blocks, gust, out):
-    """out = d + acc, (3,) rad/s2: the acceleration that the control law's model lacks.
+    """Fill out = d + acc, (3,) rad/s2: the acceleration that the control law's model lacks.
 
     d: estimated drift; acc: effect of the gust that the vanes measure.
     """
@@ -150,11 +153,12 @@ def fill_unmodelled(blocks, gust, out):
 
 @kernel
 def update_alarm(stat, views, t, bounded=True):
-    """Fill the scores over the alarm level, the largest, its axis, and at the first alarm its time t s.
+    """Fill the scores over the alarm level, the largest of them with its axis, and at the first alarm its
+    time t s.
 
-    Scores of forces and of oscillations are in the column of the step on their axis: the last ones of the
-    n_scores in `share`, one an axis. The largest is 0 unless `bounded`: outside its map, the model's error
-    has no bound.
+    Scores of forces and of oscillations are in the column of the step on their axis: the last three of the
+    n_scores columns of `share` are those of the axes. Unless `bounded`, the largest is set to 0: outside its
+    map, the model's error has no bound.
     """
     alarm = stat.alarm
     cfg = stat.test
@@ -182,18 +186,19 @@ def keep_score(alarm, share, axis, column):
 
 
 @kernel
-def best_alternative(b, fies, of, s, revived=False):
-    """max_h lo_h over all alternatives h to the loss of surface s in block b.
+def best_alternative(b, fies, loss_number, s, revived=False):
+    """max_h lo_h over all alternatives h to the loss of surface s in block b, at least 0, that of no fault.
 
-    Excluded losses are no alternatives, unless `revived`: as evidence decays, an uncertainty that correlates
-    with the commands may support them again.
+    Alternatives are the steps, the moment in alpha^3, and the losses of other surfaces. An excluded loss is
+    none, unless `revived`: as evidence decays, an uncertainty that correlates with the commands may support
+    it again.
     """
     lo = 0.0
     for h in b.hypothesis[: b.n_h]:
         if h.kind in (GROWING_LOSS, LOSS_END):
             continue
         if h.kind == LOSS:
-            e = of[h.surface]
+            e = loss_number[h.surface]
             if h.surface == s or (e >= 0 and fies[e].excluded and not revived):
                 continue
         lo = max(lo, h.llr_lo)
@@ -202,8 +207,8 @@ def best_alternative(b, fies, of, s, revived=False):
 
 @kernel
 def loss_bounds(b, s, ended):
-    """max_h (lo_h, hi_h) over the losses of surface s in block b, or, if `ended`, over their ends; 0 without
-    any."""
+    """(max_h lo_h, max_h hi_h) over hypotheses of surface s in block b: its constant and its growing loss,
+    or, if `ended`, the end of its loss; 0 without any."""
     lo = hi = 0.0
     for h in b.hypothesis[: b.n_h]:
         if h.surface == s and (h.kind == LOSS_END) == ended:
@@ -212,41 +217,44 @@ def loss_bounds(b, s, ended):
 
 
 @kernel
-def confirms_loss(cfg, blocks, fies, of, s):
+def confirms_loss(cfg, blocks, fies, loss_number, s):
     """True if a loss of surface s explains the data better than all alternatives:
 
         lo_loss - max_alternatives lo > margin      in some block
 
-    If the estimator is weakly excluded by DAMAGE_EXCLUDES, excluded losses are alternatives as well.
+    If the loss is weakly excluded (DAMAGE_EXCLUDES), excluded losses are alternatives as well.
     """
-    revived = of[s] >= 0 and fies[of[s]].weak == DAMAGE_EXCLUDES
+    revived = loss_number[s] >= 0 and fies[loss_number[s]].weak == DAMAGE_EXCLUDES
     for b in blocks:
-        if loss_bounds(b, s, False)[LO] - best_alternative(b, fies, of, s, revived) > cfg.margin:
+        if loss_bounds(b, s, False)[LO] - best_alternative(b, fies, loss_number, s, revived) > cfg.margin:
             return True
     return False
 
 
 @kernel
-def excludes_loss(cfg, blocks, fies, of, s, pitch_ends, abrupt):
+def excludes_loss(cfg, blocks, fies, loss_number, s, pitch_ends, abrupt):
     """True if an alternative explains the data better than a loss of surface s:
 
         best - max(hi, hi_end) > margin,   hi < share best,   hi_end < share_end best
 
     best: the largest lo of the alternatives; hi, hi_end: bounds of the loss and of its end. Each block of
-    roll and yaw is compared together with that of pitch, because a loss acts on its own axes only. A loss
-    that begins or ends inside a frame of several instants (w < 1) is not constant in this frame, and a loss
-    that is not declared `abrupt` may grow. A constant theta then explains only a part of its effect, so that
-    share and share_end are MIN_LLR_SHARE instead of 1. The end of a loss in pitch counts only if `pitch_ends`
-    is set: a fault outside the class may look like it.
+    roll and yaw is compared together with that of pitch, because a loss acts on its own axes only. The end of
+    a loss in pitch counts only if `pitch_ends` is set: a fault outside the class may look like it.
+
+    A constant theta may explain only a part of a loss. The shares are then MIN_LLR_SHARE:
+
+        w < 1       a loss may begin or end inside a frame of several instants    share, share_end
+        w = 1       it is constant in each frame                                  share_end = 1
+                    a loss that is not declared `abrupt` may grow                 share, else 1
     """
     pitch = blocks[likelihood.PITCH_BLOCK]
     share_end = 1.0 if cfg.w == 1.0 else MIN_LLR_SHARE
     share = share_end if abrupt else MIN_LLR_SHARE
-    best_pitch = best_alternative(pitch, fies, of, s)
+    best_pitch = best_alternative(pitch, fies, loss_number, s)
     hi_pitch = loss_bounds(pitch, s, False)[HI]
     hi_end_pitch = loss_bounds(pitch, s, True)[HI] if pitch_ends else 0.0
     for b in blocks[LATERAL_BLOCK:]:
-        best = max(best_pitch, best_alternative(b, fies, of, s))
+        best = max(best_pitch, best_alternative(b, fies, loss_number, s))
         hi = max(hi_pitch, loss_bounds(b, s, False)[HI])
         hi_end = max(hi_end_pitch, loss_bounds(b, s, True)[HI])
         if hi < share * best and hi_end < share_end * best and best - max(hi, hi_end) > cfg.margin:
@@ -256,8 +264,8 @@ def excludes_loss(cfg, blocks, fies, of, s, pitch_ends, abrupt):
 
 @kernel
 def estimate_loss(blocks, s):
-    """(theta, D): estimate in [-1, 0] of a loss of surface s, where the block knows it best, and one over its
-    variance.
+    """(theta, D): estimate in [-1, 0] of a loss of surface s, and one over its variance, from the block in
+    which this variance is smallest.
     """
     th = D = 0.0
     for b in blocks:
@@ -314,11 +322,13 @@ def add_test_instant(stat, bound, model, meas, u, dt):
 
 @kernel
 def fill_drift(noise, eta, blocks, gust, V, dt):
-    """Fill of each block the drift's intensity Q_d and decay a; of the filter without gust the noise, too.
+    """Fill the intensity Q_d and the decay a of the drift of each block, and for its filter without gust Q_d
+    and the noise Q_x.
 
         Q_d,ij = Q_scale q_gust,ij + [i = j] q max(eta_i, MIN_ETA_RAD_S2)^2,      a = exp(-dt V / length)
 
-    Q_d, q_gust (3, 3): (rad/s2)2/s; V m/s; length m; q 1/s.
+    i, j: axes of the block; Q_d, q_gust (rad/s2)2/s; V m/s; length m: `drift_correlation_length_m`, 0 for a
+    random walk, a = 1; q 1/s. The filter without gust has the second term alone.
     """
     gusty = gust.output.gusty
     for m, b in enumerate(blocks):

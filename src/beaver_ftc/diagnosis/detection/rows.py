@@ -86,7 +86,7 @@ MAX_COLUMNS = MAX_TERMS + N_INPUT_READINGS + 2 * (MAX_FORCE_REGRESSORS + 1)
 MAX_FORCE_LAG_S = 0.002
 MIN_GYRO_STD_RAD_S = 1e-9  # noise of an exact gyro: with a variance of 0 the filters' S would be singular
 # Mapped error that the filters assume outside the map. It is larger than the acceleration of any aircraft,
-# and small enough for a covariance beside a noise of 1e-4.
+# and small enough for a covariance that also holds a noise of 1e-4.
 OFF_MAP_RAD_S2 = 100.0
 _SIDE_ROW = FORCES.index("CY")
 _READING_OF = {"alpha": ALPHA, "beta": BETA, "V": AIRSPEED, "qdyn": QDYN}

@@ -52,9 +52,9 @@ from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.sensors import ENGINE, OF_THE_SLIPSTREAM
 
 Y0 = 3  # gyros come first among the signals, then alpha, beta, airspeed, dynamic pressure
-MEASURED, WORST = 0, 1
-_MIN_V_SHARE = 0.1
-MAX_ERROR_SHARE = 0.9
+MEASURED, WORST = 0, 1  # places of the two designs of magnitudes
+_MIN_V_SHARE = 0.1  # smallest airspeed of the worst case, as a share of its reading: others are divided by it
+MAX_ERROR_SHARE = 0.9  # largest relative error of a factor that divides
 # Double precision leaves 1e-16 of a rate below 6 rad/s, divided by a frame of 1 ms or more, and of the terms
 # of f + G u, which stay below 100 rad/s2; a few operations each. Where a frame is of fifty instants it leaves
 # more, 1e-10: the Earth's rate squared, 5e-9, covers that.
@@ -65,20 +65,18 @@ ROUNDING_RAD_S2 = 1e-11
 def errors_dtype(n: int) -> np.dtype:
     """The declared errors beyond the published bound, of an aircraft with n surfaces."""
     return record(
-        given=int,
-        # error of a signal: offset + slope |signal|
-        e0=7, e1=7,
-        steady=3,  # of the offset of a gyro, what does not change
-        wg=3,
-        du0=float, du=n,  # of a deflection, rad: not by its actuator; all of it now
-        # of the air's rotation, rad/s: above 2000 ft; below 1000 ft, times the root of the height in m; how
-        # far the reading of the altitude can be off: offset, m, and slope
+        given=int,  # whether any error is declared
+        e0=7, e1=7,  # bound on the error of a signal: offset + slope |signal|
+        steady=3,  # part of the offset of a gyro that does not change, rad/s
+        wg=3,  # bound on the air's rotation now, rad/s
+        du0=float, du=n,  # error of a deflection, rad: without that of its actuator; all of it now
+        # wg above 2000 ft; wg below 1000 ft, times the root of the height in m; error of the altitude's
+        # reading: offset, m, and slope
         wg_aloft=float, wg_1m=float, h0=float, h1=float,
-        # of dpt: see `slipstream_bound`
-        engine=int, kw0=float, kw1=float,
-        # the design model of magnitudes: MEASURED, and WORST
+        engine=int, kw0=float, kw1=float,  # errors of dpt: `slipstream_bound`
+        # The design model of magnitudes, MEASURED and WORST; magnitudes of rates, also relative to the air,
+        # of readings and of deflections; f, G and F = f + G u of both models there; eG: their difference in G
         model=(design_dtype(n), 2),
-        # the same of rates, also relative to the air, of readings and deflections; what the models give there
         x=(2, 3), x_air=(2, 3), y=(2, N_Y), u=(2, n), f=(2, 3), G=(2, 3, n), F=(2, 3), eG=(3, n),
     )  # fmt: skip
 
@@ -87,11 +85,15 @@ def errors_dtype(n: int) -> np.dtype:
 def bound_dtype(n: int, boxes: int = MAX_BOXES) -> np.dtype:
     """Bounds on the uncertainty.
 
-    eta_bar, eta_now: over the elapsed frame and at this instant, rad/s2. n_gyro, n_old: on the changing part
-    of a gyro's error now and a frame ago, rad/s. nu_max: on the innovation of one frame, rad/s2. eG, eGu: on
-    the error of each surface's own terms in the acceleration, per rad of deflection (rad/s2 per rad) and at
-    the command (rad/s2), means over the frame. extra: by how much the map's error with a surface at each
-    share of its travel exceeds that in eta_bar.
+    eta_bar, eta_now     bound over the elapsed frame, and at this instant, rad/s2
+    n_gyro, n_old        bound on the changing part of a gyro's error, now and a frame ago, rad/s
+    nu_max               bound on the innovation of one frame, rad/s2
+    has_eG, eG, eGu      bound on the error of each surface's own terms in the acceleration: whether it is
+                         filled, per rad of deflection (rad/s2 per rad), at the command (rad/s2); means over
+                         the frame
+    extra                by how much the map's error, with a surface at each share of its travel, exceeds that
+                         in eta_bar, rad/s2
+    const, earth_rate_rad_s, inertia_coupling_error_share: b, w_E, c of `add_published_bound`
     """
     return record(
         inertia_coupling_error_share=3, const=3, earth_rate_rad_s=float, declared_errors=errors_dtype(n),
@@ -251,7 +253,7 @@ def fill_bound(bound, model, meas, u):
     add_published_bound(err.x[WORST], model, c, b, w_E, eta)
 
 
-GUST_LIMIT_SIGMA = 6.0  # exceeded once in 5e8 independent samples
+GUST_LIMIT_SIGMA = 6.0  # standard deviations, which a gust exceeds once in 5e8 independent samples
 _INERTIA_NAMES = ("Ix_kg_m2", "Iy_kg_m2", "Iz_kg_m2", "Jxz_kg_m2")
 
 

@@ -119,7 +119,7 @@ def gust_noise(sigma: np.ndarray, model: np.void, y: np.ndarray, u: np.ndarray, 
 
 
 def moment_axis(term: Term) -> int:
-    """The axis of the moment to which a term belongs."""
+    """The axis (ROLL, PITCH or YAW) of the moment to which a term belongs."""
     return MOMENTS.index(term.coefficient)
 
 

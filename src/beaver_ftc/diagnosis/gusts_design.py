@@ -1,7 +1,7 @@
 """The record of the gust estimate, and its noise, as they follow from what a scenario declares.
 
-Letters as in gusts.py; b m/s2: error of the acceleration that predicts the velocity; sigma m/s: standard
-deviation of a gust.
+Letters as in gusts.py, and: sigma m/s: standard deviation of a gust; in `configure_gust_speed`, b m/s2 is the
+error of the acceleration that predicts the velocity, and a 1/s the decay rate of v_g.
 """
 
 import numpy as np
@@ -18,16 +18,18 @@ from beaver_ftc.scenario.declared import MASS_TOLERANCE, Declared, SensorErrors
 
 INTEGRATION_NOISE_GAIN = 1.6  # noise gain of the two-step method: sqrt(1.5^2 + 0.5^2)
 MAX_GUST_STDS = 4.0  # limit of the estimated gust velocity, standard deviations
-MAX_PATH_SLOPE_RAD = 0.3  # of the path, along which gravity acts
-MAX_DRAG_OVER_WEIGHT = 0.3  # upper limit of drag over weight: errors of coefficients are a share of it
+MAX_PATH_SLOPE_RAD = 0.3  # largest slope of the path: this share of an error of gravity acts along the path
+MAX_DRAG_OVER_WEIGHT = 0.3  # largest drag over weight: errors of coefficients are a share of the drag
 
 
 def configure_gust(gust: np.void, declared: Declared) -> None:
-    """Fill the record with the declared turbulence."""
+    """Fill the record for the declared turbulence. The gust is measured only if the forces are known, by the
+    design model or by accelerometers.
+    """
     air, aircraft, span = declared.air, declared.aircraft, declared.aircraft.geometry.span_m
     output, memory, altitude = gust["output"], gust["memory"], declared.sensors["altitude"]
     known = bool(aircraft.measurable_forces)
-    measured = known or output["uses_accelerometers"]  # only where forces are known
+    measured = known or output["uses_accelerometers"]
     fill(output, gusty=air.moves, measured=measured)
     fill_table(memory["table"], aircraft, aircraft.measurable_forces, FORCES, declared.scale)
     aloft = air.rotation_walk(span)
@@ -45,35 +47,36 @@ def add_gust_noise(
 ) -> None:
     """Add the noise of the gust estimate to the model noise of the detector.
 
-    It is the noise of the vanes and of the force that predicts the velocity; for the estimate without vanes
-    that of the forces as well. y, u: in trim.
+    It is the noise of the flow angles from the vanes, rad, and of the accelerometers that predict the
+    velocity, integrated over a frame of dt s. The estimate without vanes, `gust_noise` of the forces, has the
+    noise of the accelerometers over the effect of the flow angle. y, u: in trim.
     """
     std, forces, gust = flow_noise(errors, y[AIRSPEED]), stat["forces"], stat["gust"]
     span = float(gust["config"]["span"])
     if forces["in_use"] or gust["output"]["uses_accelerometers"]:
         std += INTEGRATION_NOISE_GAIN * errors.each("random", ("az", "ay")) * dt / y[AIRSPEED]
     if forces["in_use"]:
-        each = forces["component"][::-1]  # normal to the body, and across
-        by_forces = np.sqrt(each["var_acc"]) / np.abs(each["vane"][:, VANE_E])
+        components = forces["component"][::-1]  # normal force first: `gust_noise` takes incidence, sideslip
+        by_forces = np.sqrt(components["var_acc"]) / np.abs(components["vane"][:, VANE_E])
         forces["gust_noise"] = gust_noise(by_forces, design, y, u, span)
     for name in ("Q0", "Q"):
         stat["noise"][name] += gust_noise(std, design, y, u, span) ** 2
 
 
 def configure_gust_speed(gust: np.void, declared: Declared, level: float, V: float) -> None:
-    """Fill the decay rate of the gust velocity and the error variance of the speed; V: in trim, m/s.
+    """Fill the decay rate a of the gust velocity, and the error variance of the speed; V m/s: in trim.
 
         a^3 = 2 b^2 V / (L sigma^2)      var_V = sigma^2 a / (a + V / L) + (b / a)^2 + errors of the airspeed
 
-    level: of the alarm, standard deviations. An acceleration error b gives the sum, of decay rate a, 1/s, an
-    error b / a. Of a gust of return rate V / L, L m: its length, the sum misses the variance
-    sigma^2 a / (a + V / L). The total of both is least near that a.
+    level: of the alarm, standard deviations. The sum v_g decays at the rate a, 1/s, so an error b of the
+    acceleration, m/s2, gives it an error b / a. A gust returns to zero at the rate V / L, L m its length, so
+    the decaying sum misses the variance sigma^2 a / (a + V / L). The total of both is least near this a.
     """
     sigma, errors, out = declared.air.sigma_mps, declared.sensors, gust["output"]
     if not (out["gusty"] and out["measured"]):
         return
     rate, of_V, drag = V / SCALE_M, errors["V"], GRAVITY_MPS2 * MAX_DRAG_OVER_WEIGHT
-    b = 2.0 * EARTH_RATE_RAD_S * V + MAX_PATH_SLOPE_RAD * EARTH_M_S2  # Coriolis; gravity with place
+    b = 2.0 * EARTH_RATE_RAD_S * V + MAX_PATH_SLOPE_RAD * EARTH_M_S2  # Coriolis; change of gravity with place
     b += GRAVITY_MPS2 * (errors["phi"].steady + errors["theta"].steady)
     if out["uses_accelerometers"]:
         b += errors["ax"].steady + drag * errors["ax"].slope

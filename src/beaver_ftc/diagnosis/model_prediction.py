@@ -25,13 +25,13 @@ DEFAULT_RATE_RAD_S = pi / 3.0  # of an actuator with no declared rate limit: the
 
 @sized
 def frame_sums_dtype(n: int) -> np.dtype:
-    """Means over the instants of a frame so far, of n surfaces: F, G u, bounds eta_bar, rad/s2; G, rad/s2 per
-    rad; eG, eGu as of `bound_dtype`. An instant adds w of itself."""
+    """Means over the instants of a frame so far, of n surfaces, to which each instant adds its share w: F,
+    G u, bounds eta_bar, rad/s2; G, rad/s2 per rad; eG, eGu as in `bound_dtype`."""
     return record(
         F=3, G=(3, n), Gu=(3, n), eta_bar=3, eG=(3, n), eGu=(3, n),
-        Gu_first=(3, n),  # of the first instant alone
-        G_min=n, G_max=n,  # on each surface's dominant axis
-        u_min=n, u_max=n,  # rad
+        Gu_first=(3, n),  # w G u of the first instant alone
+        G_min=n, G_max=n,  # extremes of G on each surface's dominant axis
+        u_min=n, u_max=n,  # extremes of the position, rad
     )  # fmt: skip
 
 
@@ -39,8 +39,8 @@ def frame_sums_dtype(n: int) -> np.dtype:
 def frame_means_dtype(n: int) -> np.dtype:
     """Means over the elapsed frame, of an aircraft with n surfaces."""
     return record(
-        # rad/s2 per rad; rad/s2; see `fill_change_tolerance`, rad/s2
-        G=(3, n), Gu=(3, n), e_Gu=(3, n),
+        G=(3, n), Gu=(3, n),  # rad/s2 per rad; rad/s2
+        e_Gu=(3, n),  # error of Gu if a fault changes within the frame, rad/s2: `fill_change_tolerance`
         F=3,  # f + G u, rad/s2
         # With G of the frame before. It does not depend on the measurement noise of this frame, to which the
         # control law reacts: with G of this frame that reaction would correlate with the noise.
@@ -53,15 +53,15 @@ def frame_means_dtype(n: int) -> np.dtype:
 
 @sized
 def prediction_dtype(n: int) -> np.dtype:
-    """The designer's model of an aircraft with n surfaces and its predictions; rad, rad/s, rad/s2."""
+    """The designer's model of an aircraft with n surfaces and its predictions, in rad, rad/s and rad/s2."""
     return record(
         design=design_dtype(n), actuators=actuators_dtype(n),
         w=float,  # one over the number of instants in a frame
-        commanded=n,
+        commanded=n,  # the command in effect
         u=n, u_old=n,  # positions of healthy surfaces under the command: now, and an instant before
-        # where they may be by the declared errors of the actuators, least and greatest, rad
+        # least and greatest position by the declared errors of the actuators: now, and an instant before
         u_lo=n, u_hi=n, u_lo_old=n, u_hi_old=n,
-        f=3, G=(3, n),  # at this instant
+        f=3, G=(3, n),  # f and G at this instant
         x_before=3,  # rates measured at the start of the elapsed frame
         sums=frame_sums_dtype(n), means=frame_means_dtype(n),
         F_known=3,  # mean acceleration of the elapsed frame, known faults included
@@ -73,8 +73,8 @@ def servo_data(declared: Declared) -> dict[str, np.ndarray]:
     """The declared actuators and their errors, (surfaces,) each, by the names of `DeclaredErrors`: rad,
     rad/s, 1/s; the errors of bandwidth and rate limit are relative. 0 stands for no lag and for no limit."""
     names = declared.aircraft.surfaces
-    servos = [getattr(declared.servos, s) for s in names]
-    errors = [getattr(declared.servo_errors, s) for s in names]
+    servos = [getattr(declared.servos, name) for name in names]
+    errors = [getattr(declared.servo_errors, name) for name in names]
     return {
         "bandwidth_rad_s": np.array([servo.bandwidth_rad_s for servo in servos]),
         "rate_limit_rad_s": np.radians([servo.rate_limit_deg_s for servo in servos]),
@@ -85,7 +85,14 @@ def servo_data(declared: Declared) -> dict[str, np.ndarray]:
 
 
 def configure_prediction(pred: np.void, declared: Declared, travel: np.ndarray) -> None:
-    """Fill the design model and the declared actuators; travel (2, n) rad: the stops."""
+    """Fill the design model and the declared actuators; travel (2, n) rad: the stops.
+
+        approach = 1 - exp(-h omega)      step = h rate
+
+    In an instant of h s, a surface covers the share `approach` of the distance to its command, and at most
+    `step`. approaches, steps: the same for the slowest and the fastest actuator by the declared errors.
+    omega rad/s, rate rad/s: 0 stands for no lag and for no limit.
+    """
     servos, h = servo_data(declared), 1.0 / declared.rate_hz / declared.substeps
     slow_to_fast = np.array([-1.0, 0.0, 1.0])  # times the error: slowest, as declared, fastest
     omega, rate = servos["bandwidth_rad_s"], servos["rate_limit_rad_s"]
@@ -137,7 +144,8 @@ def add_to_sums(pred, bound, layout, all_types):
 
 @kernel
 def fill_means(pred, bound):
-    """Fill the means over the elapsed frame: G, G u of each surface, F = f + G u, and the bound."""
+    """Copy the sums, which are complete, to the means over the elapsed frame: G, G u of each surface,
+    F = f + G u, the extremes, and the bounds. G_old keeps the G of the frame before."""
     sums, means = pred.sums, pred.means
     means.G_old[:] = means.G
     means.G[:] = sums.G
@@ -167,8 +175,9 @@ def fill_change_tolerance(pred):
     is r_s in isolation.md.
 
     A fault changes between frames, that is between the first JSBSim step of a frame and the others. z0 and z
-    are the effects of a healthy surface in the first and in the other n - 1 steps, w = 1 / n. The mean effect
-    of the fault then exceeds the extremes for the mean of z0 and z by at most |z0 - z| / n.
+    are the effects G u of a healthy surface in the first step, and its mean in the other n - 1 steps; w is
+    1 / n. The mean effect of the fault over the frame then exceeds its extremes, which are computed with the
+    mean of all steps, by at most |z0 - z| / n. Gu_first is w z0, and Gu - Gu_first is (1 - w) z.
     """
     w, Gu, first = pred.w, pred.sums.Gu, pred.sums.Gu_first
     for i in range(3):
@@ -178,7 +187,9 @@ def fill_change_tolerance(pred):
 
 @kernel
 def evaluate_frame(pred, bound, meas, k, dt):
-    """Fill the bound on the uncertainty at this instant, and the means over the elapsed frame, k, of dt s."""
+    """Fill the bound on the uncertainty at this instant, and the means over the elapsed frame, number k, of
+    dt s. The order matters: the bound uses the errors of the deflections, and `fill_means` replaces the
+    eta_bar that this instant has just set, but in the first frame, which has no sums."""
     bound.error_map.time_s = k * dt
     fill_deflection_errors(pred, bound.declared_errors)
     fill_bound(bound, pred.design, meas, pred.u)
@@ -192,7 +203,7 @@ def evaluate_frame(pred, bound, meas, k, dt):
 
 @kernel
 def begin_sums(pred, bound, layout, all_types, meas):
-    """Start the next frame's means with this instant, at which the old command is still in effect."""
+    """Restart the sums for the next frame with this instant, at which the old command is still in effect."""
     sums = pred.sums
     pred.x_before[:], bound.n_old[:] = meas.x, bound.n_gyro
     sums.F[:] = sums.eta_bar[:] = bound.extra[:] = 0.0

@@ -19,8 +19,9 @@ class IsolationEstimator(NamedTuple):
     """An isolation estimator, of the hypothesis that one surface has lost effectiveness (kind LOSS) or is at
     a position (kind POSITION_HYPOTHESIS).
 
-    theta_min, theta_max: known set of its parameter. active_axes: those on which its residuals count.
-    parity_direction (3,): direction in which the fault has no effect, zero where it is not used.
+    theta_min, theta_max    known set of its parameter
+    active_axes             the axes on which its residuals count
+    parity_direction        (3,): direction in which the fault has no effect, or 0 if no direction is used
     """
 
     hypothesis_kind: int
@@ -43,10 +44,13 @@ class LayoutOfAllSurfaces(NamedTuple):
 class FaultTypesConfig(NamedTuple):
     """How fault types are examined.
 
-    single_instant: a frame, or block, shows one instant. n_substeps: JSBSim frames in a frame.
-    returns_lagged: a released surface returns by its actuator.
-    half_blocks: blocks in half of the slowest oscillation. frames_per_block: frames in a block,
-    1 where every frame is examined by itself; block_duration_s: its duration.
+    single_instant      whether a frame, or block, shows one instant
+    n_substeps          number of JSBSim frames in a frame
+    returns_lagged      whether a released surface returns with the lag of its actuator
+    half_blocks         number of blocks in half a period of the slowest oscillation
+    frames_per_block    number of frames in a block, 1 if every frame is examined by itself
+    block_duration_s    duration of a block
+    dt_s                duration of a frame
     """
 
     single_instant: bool
@@ -59,10 +63,12 @@ class FaultTypesConfig(NamedTuple):
 
 
 class Actuator(NamedTuple):
-    """The actuator of a surface as fault types take it; rad, rad/s.
+    """The actuator of a surface, as the fault types use it.
 
-    min_runaway_rate_rad_s: of a hardover. slow_step_rad: of a rate limit, in an
-    instant. lag_distance_rad: from its command, within which its steps are smaller.
+    travel_low_rad, travel_high_rad    the stops
+    min_runaway_rate_rad_s             smallest rate of a hardover
+    slow_step_rad                      smallest step of an instant under a rate-limit fault
+    lag_distance_rad                   distance from the command within which steps may be smaller than that
     """
 
     travel_low_rad: float
@@ -82,11 +88,16 @@ class SurfaceFaultTypes(NamedTuple):
 class DeclaredBounds(NamedTuple):
     """The declared uncertainty, by axis (3,).
 
-    eta_bar_rad_s2: bound on the model's error over the frame; changing_gyro_error_bound_rad_s: bound on the
-    changing part of a gyro's error. inertia_coupling_error_share, constant_error_rad_s2: terms
-    of eta_bar. earth_rate_rad_s. Of gyros: error at most gyro_error_bound_at_rest +
-    gyro_error_bound_per_rate |rate|, of the first what does not change, steady; zero where
-    none is declared.
+    eta_bar_rad_s2                     bound on the model's error, mean over the frame
+    changing_gyro_error_bound_rad_s    bound on the changing part of a gyro's error
+    inertia_coupling_error_share,
+    constant_error_rad_s2              the c and b of eta_bar (bounds.py)
+    earth_rate_rad_s                   rate of the Earth, a scalar
+    gyro_error_bound_at_rest_rad_s,
+    gyro_error_bound_per_rate          e_0, e_1: the error of a gyro is at most e_0 + e_1 |rate|
+    constant_gyro_error_bound_rad_s    the part of e_0 that does not change
+
+    The last three are 0 if no error is declared.
     """
 
     eta_bar_rad_s2: np.ndarray
@@ -100,8 +111,8 @@ class DeclaredBounds(NamedTuple):
 
 
 class GustReadout(NamedTuple):
-    """Gusts as the vanes see them. is_turbulence_declared; subtracts_measured_gust: its effect is subtracted
-    from the innovation."""
+    """is_turbulence_declared: whether turbulence is declared; subtracts_measured_gust: whether the effect of
+    the gust that the vanes measure is subtracted from the innovation."""
 
     is_turbulence_declared: bool
     subtracts_measured_gust: bool
@@ -110,9 +121,10 @@ class GustReadout(NamedTuple):
 class StatisticalHypothesis(NamedTuple):
     """A fault that the statistical test compares with health.
 
-    hypothesis_kind: of `likelihood`; surface, axis: which. may_raise_alarm: whether its score counts for
-    the alarm. score_in_std: largest normalised evidence over all onsets, standard deviations, like the
-    alarm level.
+    hypothesis_kind    LOSS, or a kind of likelihood.py
+    surface, axis      numbers of its surface, or -1, and of its axis
+    may_raise_alarm    whether its score counts for the alarm
+    score_in_std       largest normalised evidence over all onsets, standard deviations, as the alarm level
     """
 
     hypothesis_kind: int
@@ -123,8 +135,13 @@ class StatisticalHypothesis(NamedTuple):
 
 
 class HypothesisTestsByOnset(NamedTuple):
-    """By hypothesis and onset (hypotheses, N_SLOTS): score, direction of the loss that is tested (0:
-    either), and the part of the correlation that calm air and that gusts seen by the vanes explain."""
+    """Tests by hypothesis and onset, (hypotheses, N_SLOTS) each.
+
+    score                                  normalised evidence, standard deviations
+    supporting_correlation_sign            sign of the correlation N that supports the hypothesis, 0: either
+    correlation_predictable_in_calm_air    part of N that air calmer than declared explains
+    correlation_from_coarse_gust           part of N that a gust explains which vanes show coarsely
+    """
 
     score: np.ndarray
     supporting_correlation_sign: np.ndarray
@@ -135,9 +152,11 @@ class HypothesisTestsByOnset(NamedTuple):
 class StatisticalBlock(NamedTuple):
     """One Kalman filter of the statistical detector and the hypotheses on its axes.
 
-    axis_indices: of its states. drift_correlation_length_m: of the drift, m; 0 for none.
-    factor_on_gust_drift_intensity: on the variance of a gust seen roughly. regressor_coefficient_error_bound
-    (regressors,): of the constants that are not known, 0 for one not used.
+    axis_indices                         the axes of its states
+    drift_correlation_length_m           length over which the drift returns to zero, 0 for a random walk
+    factor_on_gust_drift_intensity       Q_scale, on the intensity of the drift by gusts
+    regressor_coefficient_error_bound    (regressors,): tolerance of each unknown constant
+    hypotheses, hypothesis_tests_by_onset
     """
 
     axis_indices: tuple[int, ...]
@@ -151,9 +170,10 @@ class StatisticalBlock(NamedTuple):
 class SensorTest(NamedTuple):
     """One redundancy test of the sensor monitor, in the unit of its residual.
 
-    residual: of the last sample. bound_per_s, bound_per_sample: parts of the bound on it, the first for each
-    second of the sample. gust_gain: effect on it of 1 m/s that a gust changes by.
-    filtered_residual, filtered_bound (poles,): through the filters.
+    residual                             residual of the last sample
+    bound_per_s, bound_per_sample        the two parts of the bound on it; the first is per second
+    gust_gain                            effect on it of a gust that changes by 1 m/s
+    filtered_residual, filtered_bound    (poles,): residual and bound through the filters
     """
 
     residual: float
@@ -165,13 +185,17 @@ class SensorTest(NamedTuple):
 
 
 class SensorMonitor(NamedTuple):
-    """The sensor monitor. enabled; has_raised_alarm: an alarm of its own stands.
+    """The sensor monitor.
 
-    worst_test_index: of the test with the largest ratio of residual to bound; top_ratio:
-    that ratio; worst_test: the numbers of that test. isolated_sensor_index: -1 for none;
-    is_reading_unused (sensors,): the reading is not used any more. sample_time_s: between two samples.
-    gust_change_mps (poles,): bound on the changes of a gust through the filters.
-    predicted_reading, reading_bound (sensors,): SI; the engine's readings are predicted by its commands.
+    enabled, has_raised_alarm      whether it runs; whether its own alarm stands
+    worst_test_index, top_ratio    test with the largest ratio of residual to bound, and that ratio
+    worst_test                     residual and bounds of that test
+    isolated_sensor_index          the isolated sensor, or -1
+    is_reading_unused              (sensors,): whether the reading is no longer used
+    sample_time_s                  time between two samples
+    gust_change_mps                (poles,): bound on the changes of a gust through the filters
+    predicted_reading,
+    reading_bound                  (sensors,), SI: prediction, of the engine its commands; bound on the error
     """
 
     enabled: bool
@@ -188,7 +212,8 @@ class SensorMonitor(NamedTuple):
 
 
 class DiagnosisReadout:
-    """The diagnosis at the frame in which it is read first; see the types of what it returns."""
+    """The diagnosis at one frame. Each value is copied when it is read first, so a readout is for one frame;
+    the classes above document the values."""
 
     def __init__(self, fdi: np.void) -> None:
         self._fdi = fdi

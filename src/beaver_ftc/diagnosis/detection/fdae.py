@@ -60,7 +60,8 @@ def configure_fdae(fdae: np.void, declared: Declared) -> None:
 
 @kernel
 def start(bank, fdae, x, n):
-    """Begin all filters at the first measurement x (3,) rad/s; n (3,) rad/s: errors of the gyros to come."""
+    """Start FDAE and bank at the first measurement x (3,) rad/s; n (3,) rad/s: bounds on the changing part of
+    the errors of the gyros, which the filters contain from the start."""
     fdae.memory.xhat[:], fdae.memory.m[:] = x, n
     bank.memory.e[: bank.config.n_filters] = n
 
@@ -123,7 +124,8 @@ def train(W, Phi, a, step, W_max):
 def train_network(net, eps, mu, leaks, dt):
     """W <- clip(exp(-leak dt) W + dt gain D[eps] Phi, w_max): the weights after a frame.
 
-    leaks: the weights decay, because another estimate explains the fault.
+    eps (3,) rad/s: residual; mu (3,) rad/s: its threshold; leaks: whether the weights decay, because another
+    estimate explains the fault; otherwise exp(-leak dt) is 1.
     """
     a = np.exp(-net.config.leak * dt) if leaks else 1.0
     for i in range(3):
@@ -139,7 +141,7 @@ def reset_network(net):
 
 @kernel
 def fdae_residual(fdae, x):
-    """eps0 = x - xhat0."""
+    """Fill eps0 = x - xhat0, (3,) rad/s, of the FDAE."""
     for i in range(3):
         fdae.output.residual[i] = x[i] - fdae.memory.xhat[i]
 
@@ -165,7 +167,7 @@ def advance_fdae(fdae, bank, bound, x, F, detected, leaks, dt):
 
 @kernel
 def fdae_unmodelled(fdae, n, out):
-    """out = fhat + Lambda0 D[eps0], (3,) rad/s2: estimated acceleration in addition to the model.
+    """Fill out = fhat + Lambda0 D[eps0], (3,) rad/s2: estimated acceleration in addition to the model.
 
     The residual settles at (phi - fhat) / Lambda0, so Lambda0 eps0 is the part of the fault not yet in the
     weights, at the bandwidth of the estimator. The dead zone m + n is what the gyro's error alone explains:

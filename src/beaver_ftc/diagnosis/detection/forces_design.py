@@ -1,6 +1,7 @@
-"""The records of the forces as they follow from what a scenario declares.
+"""The records of the forces, as they follow from what a scenario declares.
 
-Letters as in forces.py; y, x, u of a `TrimState` are in trim.
+Letters as in forces.py. i: number of the force; f: its record; err: record of the declared errors
+(bounds.py); x, y, u of a `TrimState`: rates, readings and deflections in trim.
 """
 
 import numpy as np
@@ -58,8 +59,10 @@ def _configure_force(
         f_all = per_C dC / d(alpha, beta, V, p, q, r, dpt),      per_C = qdyn S / m c
         Q_e = f_vane^2 (Q_angle + walk),      Q_angle = (DRIFT_CHANGE_PER_S drift)^2 + dt (std / V)^2
 
-    f_vane rad/s2 per rad: element of f_all of the force's vane; Q_angle rad2/s: intensity of the drift of the
-    flow angle from inertial motion; walk rad2/s: by gusts; std m/s2: noise of the accelerometer.
+    f_all (7,): slopes of e, in the order of `_force_slopes`; f_vane rad/s2 per rad: that with the force's
+    vane; Q_angle rad2/s: intensity of the drift of the flow angle from inertial motion; drift rad/s: bound on
+    that drift; walk rad2/s: intensity of the change of that angle by gusts; std m/s2: noise of the
+    accelerometer.
     """
     y, aircraft, errors = trim[1], declared.aircraft, declared.sensors
     forces, cfg = stat["forces"], stat["gust"]["config"]
@@ -85,7 +88,7 @@ def _configure_force(
 def _force_variances(
     err: np.void, errors: SensorErrors, y: np.ndarray, f_all: np.ndarray, vane: int
 ) -> tuple[float, float]:
-    """Variance of a predicted force by the noise of all readings, (rad/s2)2, and without that of its vane:
+    """Variance of a predicted force by the noise of all readings, (rad/s2)2; the same without its vane:
 
         sum_k (f_k sigma_k)^2 + f_dpt^2 var_dpt,      k: alpha, beta, V, p, q, r
 
@@ -102,7 +105,8 @@ def _force_variances(
 
 
 def _slipstream_noise(y: np.ndarray, err: np.void, errors: SensorErrors) -> tuple[float, float]:
-    """How dpt moves with the reading of the airspeed, s/m; its variance by those of pressure and power."""
+    """Slope of dpt with the reading of the airspeed, s/m; variance of dpt by the noise of dynamic pressure
+    and power. Both are 0 if no errors of the engine's instruments are declared."""
     if not err["engine"]:
         return 0.0, 0.0
     dpt_V, dpt_q, dpt_kw = slipstream_slopes(y, err["kw1"])
@@ -111,15 +115,16 @@ def _slipstream_noise(y: np.ndarray, err: np.void, errors: SensorErrors) -> tupl
 
 
 def _drift_bound(errors: SensorErrors, gravity: float, V: float, i: int) -> float:
-    """Bound the drift of the flow angle from inertial motion, rad/s: w_E + gyros + a / V.
+    """Bound on the drift of the flow angle from inertial motion, rad/s: w_E + gyros + a / V.
 
-    a m/s2: error of the acceleration across the flow. An error of the attitude turns gravity: in the
-    incidence, only the component by the slope of the path acts; in sideslip, all of it.
+    w_E: rate of the Earth; gyros: sum of their constant errors, with the slope at TYPICAL_RATE_RAD_S; a m/s2:
+    error of the acceleration across the flow. An error of the attitude turns gravity, which then has an error
+    across the flow: all of it in the sideslip, and its part by the slope of the path in the incidence.
     """
     attitude = errors["phi"].steady + errors["theta"].steady
     gyros = sum(errors[name].steady + TYPICAL_RATE_RAD_S * errors[name].slope for name in AXES)
-    # error of the accelerometers across the flow in level flight: all of that along the force, and of the one
-    # ahead the component by the slope of the flow
+    # Errors of two accelerometers act across the flow: all of that along the force, and of the error of the
+    # one ahead the part by the slope of the flow.
     acc = errors[MEASURED_FORCES[i].accelerometer]
     a = acc.steady + TYPICAL_SLOPE_RAD * errors["ax"].steady + EARTH_M_S2
     a += gravity * (acc.slope + attitude * TYPICAL_SLOPE_RAD if i == NORMAL_INDEX else attitude)
@@ -129,7 +134,9 @@ def _drift_bound(errors: SensorErrors, gravity: float, V: float, i: int) -> floa
 def _configure_columns(
     stat: np.void, declared: Declared, y: np.ndarray, C_vane: float, drift: float, i: int
 ) -> None:
-    """Fill the tolerances of the columns of force i, and the columns of an error of the vane.
+    """Fill the tolerances of the columns of force i, and the effect G of an error of its vane, with e_G.
+
+    C_vane: slope of the force's coefficient with the flow angle, 1/rad; drift rad/s: of `_drift_bound`.
 
     The columns follow each other in Z from `first` on. rows.py fills all but the bias, which is constant:
 

@@ -88,10 +88,10 @@ from beaver_ftc.diagnosis.state import SIDE_FORCE
 PEAK_MEMORY_RATIO = 5.0  # time constant of `peak` over the one with which evidence is forgotten
 MIN_FORCE_PART = 0.9  # component of a direction of length 1, above which a view counts as one of the force
 MIN_NORM_SHARE = 0.1  # least length that the errors leave of a column, as a share of its length
-FORCE_PLACE = 2  # in `places`: of the row j, of the force
+FORCE_PLACE = 2  # index in `places` of j, the row of the force
 
-# Values of `nulled` besides a surface: a view of an axis; one across the column of an error of the side vane,
-# of the other vane.
+# Values of `nulled` that are no surface: AXIS_VIEW for a view of an axis; VANE_VIEW + i for a view across the
+# column of an error of the vane of force i.
 AXIS_VIEW, VANE_VIEW = -1, MAX_SURFACES
 
 
@@ -112,15 +112,15 @@ USUAL_SIZE = StatisticalSize(BlockCapacity(23, USUAL_HYPOTHESES), BlockCapacity(
 def view_dtype(size: BlockCapacity) -> np.dtype:
     """A view whose block has these capacities."""
     return record(
-        nulled=int,  # whose column of `rows.G` the direction is orthogonal to, or AXIS_VIEW
-        alarm_axis=int,  # reported with an alarm of this view
-        # the rows (i, k, j) that it combines, k = -1 if only two; j: of the force, if it sees one; g / |g|
+        nulled=int,  # the column of `rows.G` to which the direction is orthogonal, or AXIS_VIEW
+        alarm_axis=int,  # axis that an alarm of this view reports
+        # the rows (i, k, j) that it combines: k = -1 if only two, j the force if it sees one; col: g / |g|
         places=(int, 3), col=5,
         by_force=int,  # whether it sees a force
         confirmer=int,  # row of the force of the views that confirm this one; -1 if no vane is used
-        # of this frame: whether the view is used; which share of nu along the column leaks into it
+        # in this frame: whether the view is used; share of nu along the column that leaks into it
         used=int, leak=float,
-        L_rate=3, L_force=3,  # by the rates and by the forces that it combines, 1/s: fill_view_drift
+        L_rate=3, L_force=3,  # L by the rates and by the forces that it combines, 1/s: fill_view_drift
         peak=float,  # largest score, decaying slowly
         block=likelihood.block_dtype(size), tones=tones_dtype(size.max_regressors),
     )  # fmt: skip
@@ -132,9 +132,13 @@ def turn_view(view, rows, gust):
 
         m = g x q / |g x q|      col = g / |g|      on the rows i, k, j of `places`
 
-    q: the effect of the rolling gust on i and k, 1/s, or, without a row k, along the place of k; it has no
-    part along j. Returns the share of the innovation along g that errors e of g let leak into the view,
-    |m|' e / (|g| - |col|' e). If g x q = 0, as in the first frame, the view keeps its direction.
+    q: the effect of the rolling gust on the rows i and k, 1/s, 0 on j, so that the view shows no rolling gust
+    either. Without a row k, q is the unit vector of its place, and m lies in the plane of i and j. If
+    g x q = 0, as in the first frame, the view keeps its direction.
+
+    Returns the share of the innovation along g that errors e of g (`e_G`) let leak into the view:
+
+        |m|' e / max(|g| - |col|' e, MIN_NORM_SHARE |g|)
     """
     m, col, c = view.block.m[0], view.col, view.nulled
     i, k, j = view.places[0], view.places[1], view.places[2]
@@ -166,7 +170,8 @@ def fill_view_drift(view, q, gust, subtracted, forces, V):
     It is that of a bounded uncertainty, that of the flow angle from inertial motion, and that of the rotation
     of the air, by L_rate = m' L and L_force = sum over the forces of m L_f.
 
-    q: see NOISE_RECORD. gust: the estimate of the views; subtracted: that which this view subtracts, if any.
+    q: see NOISE_RECORD. gust: the gust estimate that gives L and the variance by turns; subtracted: the one
+    that gives the drift, which is that of this view's source.
     """
     b, L = view.block, gust.output.rate_damping
     m = row_of(b.m, 0)
@@ -189,7 +194,9 @@ def fill_view_drift(view, q, gust, subtracted, forces, V):
 def project_views(views, noise, rows, forces, gust, vaned, vaneless, V):
     """Bring direction, noise, signatures and regressors of each view to the elapsed frame; V m/s.
 
-    gust, vaned, vaneless: the estimates that are subtracted (rows.py).
+    gust, vaned, vaneless: the gust estimates (rows.py). A view of RAW rates takes the rotation of the air
+    from `gust`, the others from `vaned`; a view without vanes has the drift of `vaneless`. The order matters:
+    the direction is turned before the rows are projected on it.
     """
     for view in views:
         b = view.block
@@ -211,7 +218,8 @@ def update_views(views, cfg, c, y, dt, k, latched):
 
         peak <- max((1 - (1 - forget) / PEAK_MEMORY_RATIO) peak, score)
 
-    c: of TONE_RECORD; latched: the detector has raised its alarm, so evidence decays and no slot restarts.
+    c: configuration of the oscillation tests (TONE_RECORD); latched: the detector has raised its alarm, so
+    evidence decays and no slot restarts.
     """
     inside = within_limits(c, y)
     decay = cfg.forget if latched else 1.0
@@ -234,7 +242,8 @@ def changes_view(view, forces, s, G):
     """True if a fault of surface s changes the projection of a view, m' (G, G_f) != 0; G (3,), G_f (2,): its
     effect on the rates and on the forces now.
 
-    The column that the view was turned across is that of the frame before, and zero in the first.
+    For the surface s that the view nulls this is false by definition: the view was turned across its column
+    of the frame before, so m' G of this frame is not exactly 0.
     """
     m = row_of(view.block.m, 0)
     effect = project(G, m, False)

@@ -50,14 +50,15 @@ KAPPA_PER_S = 1.5
 
 # Share of the alarm level reserved for noise in addition to an uncertainty at its bound (statistical.md).
 LEVEL_NOISE_SHARE = 0.5
-# With it 42 of 75 faults of a GTM that were missed before are found; with 15 rad/s 23, with 8 rad/s 36, with
-# 0.2 rad/s and less 35 at most.
+# Frequency of the bounded uncertainty, if damage may take surfaces (`_configure_noise`). Chosen on flights of
+# a GTM: with it 42 of 75 faults are found that were missed before, with 15 rad/s 23, with 8 rad/s 36, with
+# 0.2 rad/s and less at most 35.
 DAMAGE_FREQUENCY_RAD_S = 3.0
 FORCE_ERROR_SHARE = 0.01  # of a gust's intensity, left unmeasured by an error of a tenth in the forces
 
 
 class Entry(NamedTuple):
-    """A hypothesis of a block: its kind (likelihood.py), its surface or -1, its axis, if it raises alarms."""
+    """A hypothesis of a block: kind (likelihood.py), surface or -1, axis, and whether it raises alarms."""
 
     kind: int
     surface: int
@@ -66,8 +67,15 @@ class Entry(NamedTuple):
 
 
 def hypotheses_by_block(aircraft: Aircraft) -> Iterator[tuple[tuple[int, ...], list[Entry]]]:
-    """Axes and hypotheses of each block: the losses of the surfaces that turn about its axes, and what they
-    are compared with. Roll and yaw are there twice (statistical.py)."""
+    """Axes and hypotheses of each block, in the order of the blocks; roll and yaw come twice (statistical.py).
+
+        LOSS, GROWING_LOSS, LOSS_END    of each surface that may be lost and turns the aircraft about an axis
+                                        of the block
+        STEP_FAULT                      on each axis of the block
+        ALPHA_CUBED_MOMENT              on pitch
+
+    Only LOSS and STEP_FAULT raise alarms.
+    """
     for axes in ((PITCH,), ROLL_YAW_PLANE, ROLL_YAW_PLANE):
         losses = [
             (s, axis)
@@ -82,8 +90,8 @@ def hypotheses_by_block(aircraft: Aircraft) -> Iterator[tuple[tuple[int, ...], l
 
 
 def count_tests(aircraft: Aircraft, *directions: ParityDirection) -> int:
-    """The number of one-sided tests that the detector makes in a frame, those of these views included: one of
-    each onset and sign of a hypothesis that can raise the alarm, and one of each frequency."""
+    """The number of one-sided tests that the detector makes in a frame, those of these views included: one
+    for each onset and sign of a hypothesis that can raise the alarm, and one for each frequency."""
     kinds = [entry.kind for _, entries in hypotheses_by_block(aircraft) for entry in entries if entry.alarms]
     n_tones = 0
     for d in directions:
@@ -96,7 +104,7 @@ def count_tests(aircraft: Aircraft, *directions: ParityDirection) -> int:
 
 
 def _quantile(p: float) -> float:
-    """Quantile p of the normal distribution; of a p that is too small for a number, that of the smallest."""
+    """Quantile p of the normal distribution; a p below the smallest float counts as that."""
     return NormalDist().inv_cdf(max(p, float_info.min))
 
 
@@ -179,9 +187,9 @@ def _configure_levels(cfg: np.void, declared: Declared, settings: Statistical, n
 
 
 def _configure_view_gusts(stat: np.void, declared: Declared) -> None:
-    """Fill the gust estimates of the views: by accelerometers in place of the vanes, and by both.
-
-    The rates use the latter, too, unless accelerometers may break.
+    """Fill the gust estimates of the views: `vaneless`, by accelerometers in place of the vanes, and `vaned`,
+    by both. Both are copies of that of the rates. The rates use accelerometers as well, unless these may
+    break. If they cannot break, `vaned` would be the same estimate, and is switched off.
     """
     gust = stat["gust"]
     vaneless = stat["vaneless"]
@@ -193,8 +201,13 @@ def _configure_view_gusts(stat: np.void, declared: Declared) -> None:
 
 
 def _configure_lengths(stat: np.void, V: float, rate_hz: float) -> None:
-    """Fill the correlation length of the drift, m, of the block whose drift reverts to its mean and, where no
-    vane measures the gust, of the pitch block; fill how much of a gust's drift each of them then has."""
+    """Fill the correlation length of the drift, m, of the block whose drift reverts to zero and, if the gust
+    is not measured, of the pitch block; fill the factor on the intensity of their gust:
+
+        Q_scale = (gust_m / length)^2        the same power at low frequency
+
+    gust_m m: correlation length of the gust on these axes, 0 in still air; the length is at most longest_m.
+    """
     cfg, out = stat["gust"]["config"], stat["gust"]["output"]
     roll_m, rotations_m = float(cfg["L_roll"]) if out["gusty"] else 0.0, rotation_lengths(cfg["span"])
     lengths = [(stat["block"][-1], min(rotations_m) if cfg["coarse_only"] else roll_m, roll_m)]
@@ -209,17 +222,17 @@ def _configure_lengths(stat: np.void, V: float, rate_hz: float) -> None:
 def _configure_blocks(stat: np.void, declared: Declared, rate: float, dt_s: float) -> None:
     """Fill axes and hypotheses of each block, its level, and its unknown constants.
 
-    rate: largest change of the bounded uncertainty within a frame, over its bound. A loss that is declared
-    constant does not grow.
+    rate: largest change of the bounded uncertainty within a frame, over its bound. If a loss is declared
+    abrupt, it neither grows nor ends, and the hypotheses of this are left out.
     """
     aircraft, cfg, rows = declared.aircraft, stat["test"], stat["rows"]
     losses = [aircraft.surfaces.index(name) for name in aircraft.class_of_losses]
     left_out = (GROWING_LOSS, LOSS_END) if declared.fdi.fault_profile == "abrupt" else ()
     cfg["n_scores"] = len(losses) + len(AXES)
     for b, (axes, all_entries) in zip(stat["block"], hypotheses_by_block(aircraft), strict=True):
-        own = [k for k, term in enumerate(aircraft.moments) if moment_axis(term) in axes]
+        terms = [k for k, term in enumerate(aircraft.moments) if moment_axis(term) in axes]
         readings = range(len(aircraft.moments), int(rows["n"]))
-        set_columns(b, rows, [*own, *readings] if rows["n"] else [])
+        set_columns(b, rows, [*terms, *readings] if rows["n"] else [])
         fill(
             b, n=len(axes), a=1.0, Q_scale=1.0, eta_rate=rate, source=RATES, alarm_level=cfg["alarm_level"],
             noise_share=0.0 if declared.is_noise_free else LEVEL_NOISE_SHARE,
@@ -232,7 +245,7 @@ def _configure_blocks(stat: np.void, declared: Declared, rate: float, dt_s: floa
         b["n_h"], b["hypothesis"]["decay"] = len(entries), exp(-KAPPA_PER_S * dt_s)
         likelihood.set_signs(b, [entry.kind for entry in entries])
         for h, (kind, s, axis, alarms) in zip(b["hypothesis"], entries, strict=False):
-            h["signature"][: len(axes)] = [kind == STEP_FAULT and axis == each for each in axes]
+            h["signature"][: len(axes)] = [kind == STEP_FAULT and axis == i for i in axes]
             column = losses.index(s) if kind == LOSS else len(losses) + axis
             fill(h, kind=kind, surface=s, axis=axis, alarms=alarms, column=column)
 

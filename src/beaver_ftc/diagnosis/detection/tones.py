@@ -50,7 +50,8 @@ TONE_RECORD = record(
     V_min=float, V_max=float,  # airspeeds, m/s, between which the tests run
     stride=int, alarm_level=float,  # frames per update; alarm level, standard deviations
     a=float, z=(complex, N_TONES), rho=(complex, N_TONES), rho2=(complex, N_TONES),  # a: decay in an update
-    # largest mean of cos(w t) d(t) for |d| <= 1; share of the larger of the variances of N's two parts
+    # c: largest mean of cos(w t) d(t) for |d| <= 1 (`max_tone_mean`); v_share: share of the variance of N
+    # that is the larger of the variances of its two parts
     c=N_TONES, v_share=N_TONES,
 )  # fmt: skip
 
@@ -59,11 +60,11 @@ TONE_RECORD = record(
 def tones_dtype(n_Z: int) -> np.dtype:
     """The oscillation tests of one view, for a number of regressors."""
     return record(
-        # since the last update: frames, those that count, sums of g, eta and g_Z over sqrt(S) in these
+        # since the last update: frames, frames that count, and sums over these of g, eta and g_Z over sqrt(S)
         n_frames=int, n_new=int, sum_g=float, sum_eta=float, sum_Z=n_Z,
         N=(complex, N_TONES), R=(complex, n_Z, N_TONES),
-        # shares of |N| by errors of coefficients and by a bounded uncertainty; for the latter, sums over the
-        # filtered bound, and over its component at twice the frequency
+        # largest parts of |N| by errors of coefficients, e_R, and by a bounded uncertainty, eta; for the
+        # latter the sums of the filtered bound, b_0, and of its component at twice the frequency, b_2
         e_R=N_TONES, eta=N_TONES, b_0=N_TONES, b_2=(complex, N_TONES),
         D=float,  # variance of N without a fault
         score=float,  # largest over the frequencies; on the scale of scores in likelihood.py
@@ -129,9 +130,12 @@ def tone_gain(K_x, K_d, a, z, dt):
 
 @kernel
 def update_tone_eta(t, c, b, dt):
-    """Update `eta`: what a bounded uncertainty, |d| <= eta sqrt(S), adds to |N|, nearly the most.
+    """Update `eta` of each frequency: nearly the most that a bounded uncertainty adds to |N|.
 
         b_0 <- a b_0 + |W| v      b_2 <- rho2 b_2 + |W| v      eta_k = c (b_0 + |b_2|),  v = sum eta
+
+    v: sum over the frames of the update of the bound over sqrt(S) (`sum_eta`), times the gain |W| of
+    `tone_gain`; c: of TONE_RECORD.
 
     |cos x| = 2 / pi (1 + 2/3 cos 2x - 2/15 cos 4x + ...). A bound that varies at twice the tone's frequency
     adds most; the last third of |b_2| is for the harmonics above. One that varies at four times the frequency

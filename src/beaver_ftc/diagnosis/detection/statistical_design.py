@@ -67,7 +67,7 @@ class Entry(NamedTuple):
 
 
 def hypotheses_by_block(aircraft: Aircraft) -> Iterator[tuple[tuple[int, ...], list[Entry]]]:
-    """Axes and hypotheses of each block, in the order of the blocks; roll and yaw come twice (statistical.py).
+    """Axes and hypotheses of each block, in their order; roll and yaw come twice (statistical.py).
 
         LOSS, GROWING_LOSS, LOSS_END    of each surface that may be lost and turns the aircraft about an axis
                                         of the block

@@ -10,7 +10,7 @@ from scipy.linalg import block_diag
 from scipy.signal import lfilter
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.diagnosis.detection import likelihood
+from beaver_ftc.diagnosis.detection import likelihood, whitening
 from beaver_ftc.diagnosis.detection.likelihood import (
     N_GROUP_TESTS,
     N_SLOTS,
@@ -102,9 +102,9 @@ class PlainKalman:
 def filter_all(block, innovations, dt, out):
     """Innovations (k, n) rad/s2 whitened into out (k, 2)."""
     for k in range(len(innovations)):
-        likelihood.advance_covariance(block, dt)
+        whitening.advance_covariance(block, dt)
         block.nu[: block.n] = innovations[k]
-        likelihood.whiten_step(block, block.state, block.nu, dt, out[k])
+        whitening.whiten_step(block, block.state, block.nu, dt, out[k])
 
 
 def weigh_all(block, innovations, signatures, regressors, dt):
@@ -123,9 +123,9 @@ def bounded_all(block, d, signatures, onset, dt):
     """Show a block an uncertainty d (k, n) up to 0.02 rad/s2, and from `onset` on signatures (k, h, n)."""
     block.eta[:] = 0.02
     for k in range(len(d)):
-        likelihood.advance_covariance(block, dt)
+        whitening.advance_covariance(block, dt)
         block.nu[: block.n] = d[k]
-        likelihood.whiten_step(block, block.state, block.nu, dt, block.g)
+        whitening.whiten_step(block, block.state, block.nu, dt, block.g)
         for h in range(block.n_h):
             block.hypothesis[h].signature[: block.n] = signatures[k, h]
         likelihood.bound_responses(block, dt)

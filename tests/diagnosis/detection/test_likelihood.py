@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from innovations import block_of, bounded_all, by_onset, covariance, drawn, weigh_all, with_hypotheses
 
-from beaver_ftc.diagnosis.detection import likelihood
+from beaver_ftc.diagnosis.detection import likelihood, whitening
 from beaver_ftc.diagnosis.detection.likelihood import N_SLOTS, STEP_FAULT
 from beaver_ftc.diagnosis.state import LOSS
 from samples import samples
@@ -112,7 +112,7 @@ def _largest_share(block, innovations, moments):
         likelihood.reset_slot(block, likelihood.restarting_slot(k))
         block["nu"][0], block["hypothesis"][0]["signature"][0] = nu, moment
         if block["calm"]["n"]:
-            likelihood.whiten_calm(block, FRAME_S)
+            whitening.whiten_calm(block, FRAME_S)
         likelihood.update_block(block, FRAME_S, 1.0)
         most = max(most, block["hypothesis"][0]["score"])
     return most

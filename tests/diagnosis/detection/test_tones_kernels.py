@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from kernels import DT, new_fdi
 
-from beaver_ftc.diagnosis.detection import likelihood, tones
+from beaver_ftc.diagnosis.detection import tones, whitening
 from beaver_ftc.diagnosis.detection.tones import TONE_MEMORY_S
 
 CHANCE, PACE, V = 1e-11, 15.0, 45.0
@@ -49,7 +49,7 @@ def test_the_filter_lets_pass_of_a_tone_what_it_does_when_run(view, K_x, K_d, ke
     block["K_x"][0, 0], block["K_d"][0, 0], block["a"] = K_x, K_d, keep
     out, response = np.zeros(2), []
     for k in range(6000):
-        likelihood.whiten_step(
+        whitening.whiten_step(
             block, block["state"], np.array([np.cos(frequency_rad_s * k * DT), 0.0]), DT, out
         )
         response.append(out[0])

@@ -12,11 +12,11 @@ if TYPE_CHECKING:
         restarting_slot,
     )
     from beaver_ftc.diagnosis.detection.likelihood import STEP_FAULT as STEP_HYPOTHESIS
-    from beaver_ftc.diagnosis.detection.likelihood import advance_covariance as advance_block
     from beaver_ftc.diagnosis.detection.likelihood import (
         bound_responses as response_of_block,
     )
-    from beaver_ftc.diagnosis.detection.likelihood import whiten_step as whiten_frame
     from beaver_ftc.diagnosis.detection.statistical_design import LEVEL_NOISE_SHARE
+    from beaver_ftc.diagnosis.detection.whitening import advance_covariance as advance_block
+    from beaver_ftc.diagnosis.detection.whitening import whiten_step as whiten_frame
 else:
     __getattr__, __dir__ = lazily(__name__)

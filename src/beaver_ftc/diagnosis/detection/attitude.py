@@ -4,7 +4,7 @@ About each body axis let xi, rad/s, be the true rate less that of the gyro, and 
 
     psi' = xi      xi' = d + phi - nu - D xi      measured: A = psi + v
 
-nu, rad/s2, is the innovation of the rates; d, rad/s2, the drift of the whitening filters (likelihood.py);
+nu, rad/s2, is the innovation of the rates; d, rad/s2, the drift of the whitening filters (whitening.py);
 D, 1/s, the damping of the rates; A, rad, the turn of the attitude beyond that of the gyros; v, rad, the noise
 of the attitude; phi, rad/s2, a fault of a surface. An error of a gyro is part of nu for any course of it. So
 the Kalman filter of (psi, xi, d) with the input nu predicts A with a broken gyro, too, and its innovation g,

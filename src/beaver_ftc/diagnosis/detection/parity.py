@@ -72,7 +72,7 @@ from beaver_ftc.compiled import kernel, record, row_of, sized
 from beaver_ftc.diagnosis.detection import likelihood
 from beaver_ftc.diagnosis.detection.directions import project
 from beaver_ftc.diagnosis.detection.forces import MIN_UPDATES
-from beaver_ftc.diagnosis.detection.likelihood import USUAL_HYPOTHESES, BlockCapacity, add_turn_to_drift
+from beaver_ftc.diagnosis.detection.likelihood import USUAL_HYPOTHESES, BlockCapacity
 from beaver_ftc.diagnosis.detection.rows import (
     INERTIAL,
     RAW,
@@ -82,6 +82,7 @@ from beaver_ftc.diagnosis.detection.rows import (
     project_rows,
 )
 from beaver_ftc.diagnosis.detection.tones import tones_dtype, update_tones, within_limits
+from beaver_ftc.diagnosis.detection.whitening import add_turn_to_drift
 from beaver_ftc.diagnosis.gusts import project_gust, view_drift
 from beaver_ftc.diagnosis.state import SIDE_FORCE
 

@@ -33,7 +33,6 @@ from beaver_ftc.diagnosis.detection import likelihood, parity
 from beaver_ftc.diagnosis.detection.attitude import attitude_dtype
 from beaver_ftc.diagnosis.detection.forces import FORCES_RECORD
 from beaver_ftc.diagnosis.detection.likelihood import (
-    D0,
     GROWING_LOSS,
     LATERAL_BLOCK,
     LOSS_END,
@@ -53,6 +52,7 @@ from beaver_ftc.diagnosis.detection.rows import (
     project_rows,
 )
 from beaver_ftc.diagnosis.detection.tones import TONE_RECORD
+from beaver_ftc.diagnosis.detection.whitening import D0, add_turn_to_drift, whiten_calm, whiten_step
 from beaver_ftc.diagnosis.gusts import (
     GUST_RECORD,
     begin_gust_sums,
@@ -119,9 +119,9 @@ def update_blocks(stat, dt, k, alarmed, may_end=False):
             for i, axis in enumerate(b.axes[: b.n]):
                 b.g_c[i] = gust.output.acc_coarse[axis]
         if gust.output.gusty:
-            likelihood.add_turn_to_drift(b, gust)
+            add_turn_to_drift(b, gust)
             if m < likelihood.REVERTING_BLOCK:
-                likelihood.whiten_calm(b, dt)
+                whiten_calm(b, dt)
             else:  # without gust both blocks of roll and yaw have the same filter
                 b.calm.g[:] = blocks[LATERAL_BLOCK].calm.g
         likelihood.update_block(b, dt, decay, cfg.forget if may_end else 0.0, cfg.mapped)
@@ -137,7 +137,7 @@ def filter_known(blocks, gust, nu, dt):
     for b in blocks[: likelihood.REVERTING_BLOCK]:
         for i, axis in enumerate(b.axes[: b.n]):
             b.nu[i] = nu[axis] - gust.output.acc_mean[axis]
-        likelihood.whiten_step(b, b.x_known, b.nu, dt, b.nu)
+        whiten_step(b, b.x_known, b.nu, dt, b.nu)
 
 
 @kernel

@@ -21,7 +21,8 @@ COMPILED = {"kernel", "apart", "lazy_kernel"}
 
 SEVERAL_FILES: set[str] = set()
 OTHER_FOLDER: set[str] = set()
-PARTS = {"TEST_FIELDS", "ISOLATION_FIELDS"}  # fields of one record, which is put together elsewhere
+# Fields of one record, which is put together elsewhere
+PARTS = {"TEST_FIELDS", "ISOLATION_FIELDS", "GYRO_FIELDS", "FLOW_FIELDS"}
 
 
 @cache

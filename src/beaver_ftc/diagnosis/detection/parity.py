@@ -306,7 +306,10 @@ def view_alarm_score(view, views, cfg, forces, gust):
 def views_exclude(views, cfg, forces, s, G):
     """True if a view detects a signal that no fault of surface s, with this column (3,) of G, can cause."""
     for view in views:
-        decides = view.block.source < VANELESS and not changes_view(view, forces, s, G)
-        if decides and confirmed_score(view, views, cfg, forces) > cfg.alarm_level:
+        if (
+            view.block.source < VANELESS
+            and not changes_view(view, forces, s, G)
+            and confirmed_score(view, views, cfg, forces) > cfg.alarm_level
+        ):
             return True
     return False

@@ -15,7 +15,8 @@ from beaver_ftc.design import Dryden
 from beaver_ftc.design.model import DesignFunctions
 from beaver_ftc.diagnosis.bounds import GUST_LIMIT_SIGMA
 from beaver_ftc.diagnosis.deviations import air_rotation_slopes
-from beaver_ftc.diagnosis.monitors.flow_or_force import N_FROZEN_NEVER
+from beaver_ftc.diagnosis.monitors.flow_or_force import FLOW_FIELDS, N_FROZEN_NEVER
+from beaver_ftc.diagnosis.monitors.gyro_or_attitude import GYRO_FIELDS
 from beaver_ftc.diagnosis.monitors.initial_errors import INITIAL_RECORD
 from beaver_ftc.diagnosis.monitors.numbering import FILTER_POLES_PER_S, NO_SENSOR
 from beaver_ftc.diagnosis.monitors.redundancy import TEST_FIELDS
@@ -57,7 +58,7 @@ MONITOR_OUTPUT_RECORD = record(
 
 SENSOR_MONITOR_RECORD = record(
     config=MONITOR_CONFIG_RECORD, output=MONITOR_OUTPUT_RECORD, **TEST_FIELDS, initial=INITIAL_RECORD,
-    **ISOLATION_FIELDS,
+    **ISOLATION_FIELDS, **GYRO_FIELDS, **FLOW_FIELDS,
 )  # fmt: skip
 
 

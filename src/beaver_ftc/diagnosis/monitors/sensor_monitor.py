@@ -27,7 +27,6 @@ from beaver_ftc.compiled import kernel
 from beaver_ftc.design.table import DPT
 from beaver_ftc.diagnosis.detection import attitude
 from beaver_ftc.diagnosis.monitors.flow_or_force import (
-    FLOW_FIELDS,
     FORCES,
     clear_sensors,
     count_same,
@@ -35,7 +34,6 @@ from beaver_ftc.diagnosis.monitors.flow_or_force import (
 )
 from beaver_ftc.diagnosis.monitors.gyro_or_attitude import (
     FULL_STAGE,
-    GYRO_FIELDS,
     advance_gyro_estimate,
     advance_stage,
     exclude_gyros,
@@ -81,9 +79,7 @@ RATE_POLE = 1  # index in FILTER_POLES_PER_S of the filter that gives the first 
 
 # What isolation keeps, in the record of the monitor. t_start: time of the first sample, s; substep: number
 # of this sample in its frame; exceeded: which tests have exceeded their bounds since the alarm.
-ISOLATION_FIELDS = {
-    "t_start": float, "substep": int, "exceeded": (int, N_TESTS), **GYRO_FIELDS, **FLOW_FIELDS
-}  # fmt: skip
+ISOLATION_FIELDS = {"t_start": float, "substep": int, "exceeded": (int, N_TESTS)}
 
 
 # One sample: test, compare, isolate, replace
@@ -126,7 +122,8 @@ def check_sensors(mon, pred, measured, found, bank, bound, dt, t):
 @kernel
 def start_monitor(mon, y, force, t):
     """Start with the first sample y, force (3,) m/s2, at t s: no earlier sample can be compared with it."""
-    mon.stage, mon.t_start, mon.e_drift = 1, t, mon.drift * t
+    mon.t_start, mon.e_drift = t, mon.drift * t
+    restart_comparison(mon)
     start_tests(mon, y, force)
     start_bounds(mon, y)
 

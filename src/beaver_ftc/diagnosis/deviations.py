@@ -26,7 +26,7 @@ from beaver_ftc.scenario.declared import Declared, SensorErrors
 if TYPE_CHECKING:
     from beaver_ftc.design.context import DeclaredErrors
 
-_FURTHER_READINGS = ("phi", "theta", "psi", "ax", "ay", "az", "altitude")  # of a plug-in, after SIGNALS
+_FURTHER_READINGS = ("phi", "theta", "psi", "ax", "ay", "az", "altitude")  # what plug-ins read beyond SIGNALS
 _GYRO_OF = dict(zip(RATE_SIGNALS, AXES, strict=True))
 
 
@@ -39,9 +39,9 @@ def plugin_errors(declared: Declared, model: np.ndarray, y: np.ndarray, u: np.nd
     aircraft, errors = declared.aircraft, declared.sensors
     instruments = {}
     for name in ("noise", "bias", "resolution", "slope"):
-        of_it = "steady" if name == "bias" else name
-        instruments[name] = errors.each(of_it)
-        instruments[f"further_{name}"] = errors.each(of_it, _FURTHER_READINGS)
+        kind = "steady" if name == "bias" else name
+        instruments[name] = errors.each(kind)
+        instruments[f"further_{name}"] = errors.each(kind, _FURTHER_READINGS)
     noise, bias, resolution = (instruments[name][Y0:] for name in ("noise", "bias", "resolution"))
     sigma = np.sqrt(noise**2 + bias**2 + resolution**2 / 12.0)  # a rounding error is uniform: variance 1/12
     dC = declared.coefficients.absolute(aircraft.moments, model["moments"]["value"][0])
@@ -124,13 +124,15 @@ def moment_axis(term: Term) -> int:
 
 
 def coefficient_bounds(declared: Declared, model: np.void, y: np.ndarray, u: np.ndarray) -> np.ndarray:
-    """Tolerance (terms,) of each moment's term that covers every declared constant error but those of the air
-    data (statistical_design.py); y, u in trim:
+    """Tolerance (terms,) of the coefficient of each term of the moments. It covers every declared constant
+    error but those of the air data, which have columns of their own (rows.py); y, u in trim:
 
         dC + (e_inertia + e_signals) |C| + [constant term] sum_j |d(Cl, Cm, Cn) / d(ph, qh, rh)_j| e_j
 
-    C, dC: values of the terms and their declared errors; e_inertia: largest relative error of what multiplies
-    a moment about its own axis; e_j: steady error of ph = p b / 2V, qh = q c / V, rh = r b / 2V by the gyros.
+    C, dC: coefficients and their declared errors; e_inertia: largest relative error of the inertia
+    coefficient that multiplies a moment about its own axis; e_signals: of `_signal_error`; e_j: error of
+    ph = p b / 2V, qh = q c / V, rh = r b / 2V by the constant errors of the gyros, which acts as a constant
+    moment.
     """
     aircraft, errors = declared.aircraft, declared.sensors
     C = np.abs(model["moments"]["value"][: len(aircraft.moments)])
@@ -147,14 +149,20 @@ def coefficient_bounds(declared: Declared, model: np.void, y: np.ndarray, u: np.
 
 
 def _signal_error(errors: SensorErrors, term: Term) -> float:
-    """Relative error of the signals that a term multiplies, by the slopes of gyros, vanes, airspeed and
-    pressure; n: power of a signal. A rate counts with its gyro and with the airspeed that divides it."""
-    own = AXES[moment_axis(term)]  # a slope of it is counted once for all terms of the axis
-    e = errors[own].slope + errors["qdyn"].slope
+    """Relative error of the product of signals that multiplies a term's coefficient, by the slope errors:
+
+        e = slope of the axis' gyro + slope of qdyn + sum_k n_k slope_k
+
+    k: signals of the term, with the powers n_k. A normalised rate counts with its gyro and with the airspeed
+    that divides it. The slope of the axis' gyro counts once for all terms of the axis, so not again as one of
+    a signal.
+    """
+    axis = AXES[moment_axis(term)]
+    e = errors[axis].slope + errors["qdyn"].slope
     for name, n in term.of:
         if name in _GYRO_OF:
             e += n * errors["V"].slope
         instrument = _GYRO_OF.get(name, name)
-        if instrument in errors and instrument != own:
+        if instrument in errors and instrument != axis:
             e += n * errors[instrument].slope
     return e

@@ -51,16 +51,19 @@ def map_dtype(n: int, boxes: int = MAX_BOXES) -> np.dtype:
 
 
 def fill_map(emap: np.void, aircraft: Aircraft, one_free: bool, two_free: bool) -> None:
-    """Write the map of the aircraft, if it has one; one_free, two_free: see `map_dtype`."""
+    """Write the map of the aircraft, if it has one; one_free, two_free: see `map_dtype`.
+
+    reach: the share of its travel that a stand-in may use, 1 for other surfaces.
+    """
     declared = aircraft.file.model_error_map
     if declared is None:
         return
     n_levels, n_rows = len(declared.travel_share), len(declared.until_s)
-    of_travel = np.array([declared.stand_ins if s in aircraft.stand_ins else 1.0 for s in aircraft.surfaces])
+    reach = np.array([declared.stand_ins if s in aircraft.stand_ins else 1.0 for s in aircraft.surfaces])
     lo, hi = np.transpose([(travel.min_rad, travel.max_rad) for travel in aircraft.travel.values()])
     fill(
         emap, one_free=one_free, two_free=two_free, n_boxes=len(declared.boxes), n_levels=n_levels,
-        n_rows=n_rows, stop_lo=of_travel * lo, stop_hi=of_travel * hi,
+        n_rows=n_rows, stop_lo=reach * lo, stop_hi=reach * hi,
     )  # fmt: skip
     emap["until_s"][:n_rows] = declared.until_s
     emap["share"][:n_levels] = declared.travel_share
@@ -90,7 +93,8 @@ def in_box(emap, b):
 
 @kernel
 def travel_share(emap, s, u):
-    """The share of its travel that surface s uses at u rad; 1 if it has no travel there."""
+    """The share of its travel that surface s uses at u rad, u over the stop on that side; 1 if it has no
+    travel on that side."""
     if u == 0.0:
         return 0.0
     stop = emap.stop_hi[s] if u > 0.0 else emap.stop_lo[s]
@@ -99,8 +103,8 @@ def travel_share(emap, s, u):
 
 @kernel
 def level_of_positions(emap, u, du):
-    """Index of the least share of the travel that covers surfaces within du of u; the last index if all of
-    the travel may be used."""
+    """Level of travel, an index of `share`: the smallest whose share covers all surfaces within du of u, rad;
+    the last if more than one surface may be anywhere."""
     if emap.two_free:
         return emap.n_levels - 1
     share = 0.0
@@ -112,7 +116,7 @@ def level_of_positions(emap, u, du):
 
 @kernel
 def level_of_share(emap, share):
-    """Index of the least share of the travel in the map that is not below `share`; else the last."""
+    """The smallest level of travel whose share is not below this `share`; the last if none is."""
     last = emap.n_levels - 1
     for j in range(last):
         if share <= emap.share[j]:
@@ -123,12 +127,12 @@ def level_of_share(emap, share):
 @kernel
 def share_used(emap, s, between, before, n):
     """The largest share of its travel that surface s can use in a frame of n instants, if it stays at one
-    position from the second instant on:
+    position p from the second instant on:
 
         |p| <= (n |mean| + |before|) / (n - 1)
 
-    between: (low, high) rad, of the mean position over the instants; before: the share at the start of the
-    frame, where the surface may still be at the first instant.
+    All are shares of the travel. between: (low, high), rad, of the mean position over the instants; before:
+    share at the start of the frame, which still holds at the first instant.
     """
     share = max(travel_share(emap, s, between[0]), travel_share(emap, s, between[1]))
     if n > 1:
@@ -172,7 +176,7 @@ def look_up_map(emap, x, y, u, du):
 
 @kernel
 def outside_span(emap, i):
-    """Whether coordinate i of the state is outside the range that the boxes span together."""
+    """Whether coordinate i of the state is outside the range that all boxes together cover."""
     lo, hi = np.inf, -np.inf
     for b in range(emap.n_boxes):  # compiled code with a reduction of an array loads scipy.linalg
         lo, hi = min(lo, emap.lo[b, i]), max(hi, emap.hi[b, i])

@@ -1,6 +1,6 @@
 """The informed test, which is given the fault and its onset: no test detects the fault more often.
 
-All that is declared is taken as Gaussian. A Kalman filter turns the measurements that plug-ins are given into
+All declared errors are taken as Gaussian. A Kalman filter turns the measurements that plug-ins are given into
 independent innovations of covariance S. A fault phi, rad/s2, adds a known signature s to them. The likelihood
 ratio of "this fault since its onset" against "no fault" has the deflection
 
@@ -21,8 +21,8 @@ with s and R scaled by S^-1/2 and the frames stacked.
 If sensors are in doubt, a gyro may have any error. The evidence that no gyro causes the flight is the
 least deflection of the three tests that each do without one gyro, and use the attitude instead.
 
-The unexplained acceleration of the published bound is a sinusoid of unknown frequency; here it is a
-first-order process of the same power with a memory of UNEXPLAINED_MEMORY_S.
+The unexplained acceleration of the published bound is a sinusoid of unknown frequency. Here it is a
+first-order process of the same power, with the time constant UNEXPLAINED_MEMORY_S.
 """
 
 from collections.abc import Mapping
@@ -43,7 +43,7 @@ from beaver_ftc.design.table import N_SIGNALS, signals
 from beaver_ftc.diagnosis.gusts import MIN_UNMEASURED_SHARES
 
 UNEXPLAINED_MEMORY_S = 0.1
-MIN_GYRO_STD_RAD_S, MIN_ATTITUDE_STD_RAD = 1e-5, 1e-5  # what perfect instruments are taken for
+MIN_GYRO_STD_RAD_S, MIN_ATTITUDE_STD_RAD = 1e-5, 1e-5  # noise that perfect instruments are assumed to have
 # Frames until the covariance S of the innovations has settled. At 50, 100 and 200 Hz, with tactical-grade
 # sensors in light turbulence, S changes after frame 400 by less than 1e-8 of itself, without a gyro, too.
 _SETTLING_FRAMES = 400
@@ -62,9 +62,10 @@ class WhiteningFilter:
         x <- x + dt (L w + v + model noise)      attitude <- attitude + dt x
         w <- a w + noise                         v <- a v + noise,      a = exp(-dt / tau)
 
-    F (12, 12): its matrix; L 1/s: effect of the rotation. It measures the rates, H (m, 12). If gyro `broken`
-    may have any error, it measures the two other rates and the attitude, which moves with the rates as in
-    level flight. K (12, m), S (m, m): gain, and covariance of the innovations.
+    F (12, 12): matrix of these equations; L (3, 3) 1/s: effect of the rotation; tau s. H (m, 12): the filter
+    measures the rates; if gyro `broken` may have any error, it measures the two other rates and the attitude,
+    which moves with the rates as in level flight. K (12, m), S (m, m): gain, and covariance of the
+    innovations, as settled.
     """
 
     def __init__(self, context: Context, broken: int | None = None) -> None:
@@ -149,12 +150,17 @@ def detection_probability(d: float, interval_s: float, alarms_per_h: float) -> f
     """
     normal = NormalDist()
     if alarms_per_h <= 0.0:
-        return 0.0  # noise that has no bound leaves nothing certain
+        return 0.0  # noise has no bound, so a test without false alarms detects no fault
     return normal.cdf(d - normal.inv_cdf(1.0 - min(alarms_per_h * interval_s / 3600.0, 0.5)))
 
 
 def healthy_positions(context: Context, columns: FlightColumns, surface: str) -> np.ndarray:
-    """Positions of a healthy surface, without a dead band, under the commands of a flight, (frames,) rad."""
+    """Positions of a healthy surface, without a dead band, under the commands of a flight, (frames,) rad:
+
+        u <- u + clip(a (command - u), -step, step)      a = 1 - exp(-bandwidth h)      step = rate h
+
+    in each JSBSim frame of h s; a bandwidth, or a rate limit, of 0 stands for none.
+    """
     s, commands = context.surfaces.index(surface), columns[f"{surface}_cmd_rad"]
     bandwidth = context.declared.bandwidth_rad_s[s]
     rate = context.declared.rate_limit_rad_s[s]

@@ -17,21 +17,21 @@ NOT_ISOLATED, UNANTICIPATED = -1, -2  # in place of an estimator: no fault isola
 # Of an estimator's `weak` (isolation.py): 0 not weakly excluded; 1 weakly excluded; this value the same,
 # because declared damage may have excluded the other estimators.
 DAMAGE_EXCLUDES = 2
-INTERVAL_THRESHOLD, PUBLISHED_THRESHOLD, CONSTANT_THRESHOLD = 0, 1, 2  # of a residual: isolation.py
-EITHER_DETECTOR, WORST_CASE_DETECTOR, STATISTICAL_DETECTOR = 0, 1, 2  # whose alarms, or exclusions, count
+INTERVAL_THRESHOLD, PUBLISHED_THRESHOLD, CONSTANT_THRESHOLD = 0, 1, 2  # kinds of threshold: isolation.py
+EITHER_DETECTOR, WORST_CASE_DETECTOR, STATISTICAL_DETECTOR = 0, 1, 2  # detectors whose conclusions count
 AUTHORITIES = {
     "either": EITHER_DETECTOR,
     "worst-case": WORST_CASE_DETECTOR,
     "statistical": STATISTICAL_DETECTOR,
 }
-# Schemes: ours, the published one, none; and that of a plug-in, whose verdict replaces ours.
+# Schemes: ours; the published one; none; that of a plug-in, whose verdict replaces ours.
 ADAPTIVE_SCHEME, PUBLISHED_SCHEME, NO_SCHEME, PLUGIN_SCHEME = range(4)
 _SCHEMES = {"adaptive-estimators": ADAPTIVE_SCHEME, "zhang2005": PUBLISHED_SCHEME, "none": NO_SCHEME}
 # Kinds of hypothesis (isolation.py): a surface has lost effectiveness; it is anywhere in its travel. LOSS of
 # types/table is a fault type, and not this number.
 LOSS, POSITION_HYPOTHESIS = 0, 1
 PITCH_GROUP, LATERAL_GROUP = 0, 1  # groups of surfaces
-ROLL, PITCH, YAW, SIDE_FORCE, NORMAL_FORCE = range(5)  # axes, and components of the force: forces.py
+ROLL, PITCH, YAW, SIDE_FORCE, NORMAL_FORCE = range(5)  # axes, and components of the force (forces.py)
 
 
 @sized
@@ -44,8 +44,9 @@ def plugin_verdict_dtype(n: int) -> np.dtype:
 
 @sized
 def layout_dtype(n: int) -> np.dtype:
-    """Axis and group of each of n surfaces, the other one of a group of two, or -1; the main surface of each
-    axis; the estimators of a surface's loss and position, or -1."""
+    """Layout of n surfaces. By surface: its dominant axis; its group (PITCH_GROUP or LATERAL_GROUP); its
+    partner, the other surface of a group of two in the aircraft's file, or -1; the numbers of the estimators
+    of its loss and of its position, or -1. By axis: the main surface."""
     return record(
         dominant_axis=(int, n), group=(int, n), partner=(int, n), main=(int, 3), loss=(int, n),
         position=(int, n),

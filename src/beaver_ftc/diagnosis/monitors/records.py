@@ -31,26 +31,27 @@ from beaver_ftc.plant.instruments import (
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.sensors import frames_apart, sensor_words
 
-ERRORS = {"e_zero": "worst", "e_slope": "slope", "const": "steady"}  # of a reading, by their declared names
+# Errors of a reading: field of the record -> name in the declaration
+ERRORS = {"e_zero": "worst", "e_slope": "slope", "const": "steady"}
 MAX_AIRSPEED_OVER_TRIM = 1.4  # largest airspeed of a flight, as a share of that in trim
 # Rate at which the attitude corrects a replaced body rate, if the attitude's noise is declared
 RATE_GAIN_PER_S = 3.0
-# So many identical samples a sound sensor never gives: one without resolution, and one with a noise of more
-# than a quarter of its resolution.
+# Number of identical samples that a sound sensor does not give: without rounding of its reading, and with a
+# noise of more than a quarter of its resolution.
 N_FROZEN_EXACT = 3
 N_FROZEN_ROUNDED = 50
-UNANTICIPATED_DELAY_S = 1.0  # from the alarm; a sensor not isolated by then makes the fault unanticipated
+UNANTICIPATED_DELAY_S = 1.0  # time from the alarm, after which a fault is unanticipated without an isolation
 MONITOR_CONFIG_RECORD = record(
-    enabled=int, substeps=int, has_engine=int, y_trim=N_SENSORS,
+    enabled=int, substeps=int, has_engine=int, y_trim=N_SENSORS,  # y_trim: readings in trim
     rate_gain=float,  # share of its error that a replaced rate corrects in one sample
-    noisy=int,  # whether the attitude is: then a surface is isolated only once no gyro can be the cause
+    noisy=int,  # whether the attitude is noisy: then a surface is isolated only once no gyro can be the cause
     n_frozen=(int, N_SENSORS),  # number of identical samples from which a reading counts as frozen
     D=(3, 3),  # 1/s: body rates decay with rate' = -D rate
 )  # fmt: skip
 
 MONITOR_OUTPUT_RECORD = record(
     alarmed=int, alarmed_at_s=float,
-    keeps_surface=int,  # a surface was found long before, with sound sensors: it stays found
+    keeps_surface=int,  # whether a surface was detected long before, with sound sensors, and stays detected
     alarm_test=int,  # test that has raised the alarm
     worst_test_index=int, top_ratio=float,  # test with the largest ratio of this frame, and that ratio
     suspect=(int, N_SENSORS), isolated_sensor=int, isolated_at_s=float, is_reading_unused=(int, N_SENSORS),
@@ -63,9 +64,9 @@ SENSOR_MONITOR_RECORD = record(
 
 
 def configure_sensor_monitor(monitor: np.void, declared: Declared, design: np.void, y: np.ndarray) -> None:
-    """Fill the monitor's record at the trim: y, the measured signals there; design: model of the designer.
+    """Fill the monitor's record: y (4 + signals,), readings in trim; design: record of the design model.
 
-    A monitor that is not declared has found nothing, and its record holds no more than that.
+    If no monitor is declared, only the output is filled: no alarm, no sensor isolated.
     """
     config = monitor["config"]
     fill(monitor["output"], isolated_sensor=NO_SENSOR, alarmed_at_s=-1.0, isolated_at_s=-1.0)
@@ -91,8 +92,8 @@ def configure_sensor_monitor(monitor: np.void, declared: Declared, design: np.vo
 
 
 def configure_errors(monitor: np.void, declared: Declared) -> None:
-    """Fill the declared errors of the readings, and from how many identical samples each is frozen; a sample
-    is a JSBSim frame."""
+    """Fill the declared errors of the readings, and the number of identical samples from which each is
+    frozen; a sample is a JSBSim frame. The attitude is noisy if an error of it changes: worst > steady."""
     config, sensors, h = monitor["config"], declared.sensors, float(monitor["h"])
     fill(monitor, **{name: sensors.each(kind, SENSORS) for name, kind in ERRORS.items()})
     drifts = [getattr(getattr(sensors.declared, name), "drift_rad_s", 0.0) for name in SENSORS]
@@ -126,7 +127,8 @@ def bound_gusts(air: Dryden, V: float, h: float) -> tuple[float, np.ndarray]:
 
 
 def sensor_monitor_finding(monitor: np.void, t_s: float) -> dict[str, Any] | None:
-    """The verdict's parts as of t_s, where a sensor is found broken; None where none is."""
+    """The parts of the verdict at t_s after an alarm of the monitor; None without one. A sensor is isolated,
+    or the fault is unanticipated, or the suspects are candidates."""
     o = monitor["output"]
     if not o["alarmed"]:
         return None

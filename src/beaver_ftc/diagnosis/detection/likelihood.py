@@ -379,13 +379,16 @@ def evaluate_tests(b, t, n, without_eta, mapped):
     z, share, r0, r1 = b.alarm_level, b.noise_share, b.eta_r[0], b.eta_r[1]
     for k in range(n):
         N, D, sign = t.correlation[k], t.information[k], t.supporting_correlation_sign[k]
-        signed, known = sign != 0.0, D > 0.0
+        signed = sign != 0.0
+        known = D > 0.0
         N_s = sign * N if signed else abs(N)
         e = t.e_R[k] + max(sign * t.N_p[k], 0.0) + max(sign * t.correlation_from_coarse_gust[k], 0.0)
         room = uncertain_share(t, k, r0, r1)
         score = evidence_ratio(z, share, N_s - e, room, D)
         e += 0.0 if without_eta and (signed or not mapped) else room
-        llr, lo, hi = max_llr(signed, N_s, D), max_llr(signed, N_s - e, D), max_llr(signed, N_s + e, D)
+        llr = max_llr(signed, N_s, D)
+        lo = max_llr(signed, N_s - e, D)
+        hi = max_llr(signed, N_s + e, D)
         t.score[k] = score if known else 0.0
         t.llr_lo[k] = lo if known else 0.0
         t.llr_hi[k] = hi if known else 0.0

@@ -49,13 +49,14 @@ MIN_JUMP_SHARE = 0.5  # the flow sensor's own reading jumps by at least this sha
 # Least ratio of summed residuals to the range of the reading: a scale error within 3 % of -1 gives so much
 MIN_SUM_RATIO = 30.0
 CLEAR_FACTOR = 3.0  # an effect clears a sensor only beyond so many times the bound on it
-TIME_ROUNDING_S = 1e-9
+TIME_ROUNDING_S = 1e-9  # a time is shorter than a window only if it is shorter by more than this
 
 FORCES = (AX, AX + 1, AX + 2)
 
-# One flow sensor (speed, incidence or sideslip) since the alarm. r_sum, B_sum, H_sum: sums of the residuals,
-# of the bound on the part of sound sensors, and on that of an error from the start, in the unit of the
-# residual; y_min, y_max: range of the reading.
+# One flow sensor (airspeed, incidence or sideslip) since the alarm. r_sum, B_sum, H_sum: sums of the
+# residuals, of the bound on the part of sound sensors, and of that on an error from the start, in the unit of
+# the residual; y_min, y_max: range of the reading. The three flow sensors, their hypotheses (H_AIRSPEED, ...)
+# and their tests (SPEED_TEST, ...) have the same order: number n stands for all.
 FLOW_RECORD = record(r_sum=float, B_sum=float, H_sum=float, y_min=float, y_max=float)
 
 # What the comparison keeps, in the record of the monitor.
@@ -64,7 +65,7 @@ FLOW_FIELDS = {
     "n_same": (int, N_SENSORS),  # for how many samples each reading has been the very same
     "cleared": (int, N_SENSORS),  # whether each sensor is cleared
     "turn_max": float,  # rad: largest turn of the attitude beyond sound gyros, 0 if unknown (attitude.py)
-    "jump": float,  # largest of an accelerometer between two samples, m/s2; it fades
+    "jump": float,  # largest change of an accelerometer between two samples, m/s2; it fades
     "n_since": int,  # samples since the alarm
     "climb": N_POLES,  # m: filtered effect on the altitude of the error that the incidence's sums show
 }  # fmt: skip
@@ -86,7 +87,7 @@ def count_same(mon, y):
 
 @kernel
 def is_frozen(mon, i):
-    """Whether sensor i is frozen."""
+    """Whether sensor i is frozen: it has given more identical samples than a sound one."""
     return mon.n_same[i] >= mon.config.n_frozen[i]
 
 
@@ -107,7 +108,10 @@ def stands_still(mon, i):
 
 @kernel
 def clear_sensors(mon, y):
-    """Clear sensors by this sample, that of the alarm or a later one, as the table at the top says."""
+    """Clear sensors by this sample, that of the alarm or a later one, as the table at the top says.
+
+    The order matters: `flow_jumped` reads n_since, the time since the alarm, before `sum_flow` advances it.
+    """
     alarm = mon.output.alarm_test
     flow = SENSOR_OF[alarm]
     by_density = alarm == SPEED_TEST and mon.exceeded[DENSITY_TEST]

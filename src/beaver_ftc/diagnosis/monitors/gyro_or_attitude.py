@@ -208,8 +208,10 @@ def judge_gyros(mon, bank, bound, dt):
     for i, g in enumerate(mon.gyro):
         if g.verdict != GYRO_OPEN:
             continue
-        estimate, B = abs(mon.w[i]), mon.w_bound[i]
-        largest, jump = max(abs(g.shown), abs(g.shown_past)), (g.shown - g.shown_past) / dt
+        estimate = abs(mon.w[i])
+        B = mon.w_bound[i]
+        largest = max(abs(g.shown), abs(g.shown_past))
+        jump = (g.shown - g.shown_past) / dt
         noise = SAMPLES_IN_JUMP * mon.per_sample[i] / mon.h
         nu_max = bound.nu_max[i] + RATE_ROUNDING
         shows = abs(nu[i]) > nu_max or bank_axis(bank) >= 0 or estimate > B + RATE_ROUNDING

@@ -247,13 +247,17 @@ def fill_attitude_effects(mon, y, w):
     truth differ by at most x over both cosines; in theta' there is no theta.
     """
     dt, H, C = mon.h, mon.initial.H, mon.initial.C
-    rates, second = vector(y)[1], (dt * w) ** 2
+    rates = vector(y)[1]
     turn = rates * unit(y[PHI])
+    second = (dt * w) ** 2
     # 1 / cos(theta) by its reading, and the largest one if theta is off
-    sec, sec_max = secant(y[THETA]), secant(abs(y[THETA]) + angle_of_chord(mon.initial.E[H_THETA]))
+    sec = secant(y[THETA])
+    sec_max = secant(abs(y[THETA]) + angle_of_chord(mon.initial.E[H_THETA]))
     # Rotation in a step, rad: about the body's second and third axes; about the vertical, psi' dt
-    qr, heading = dt * abs(turn), dt * abs(turn.imag) * sec_max
-    by_phi, by_theta = sec * (qr + sec * second), sec * sec_max * second
+    qr = dt * abs(turn)
+    heading = dt * abs(turn.imag) * sec_max
+    by_phi = sec * (qr + sec * second)
+    by_theta = sec * sec_max * second
     H[H_PHI, :SPEED_TEST] = second, second + qr, second + qr, by_phi, by_phi, by_phi
     H[H_THETA, :ANGLE_TEST] = second + heading
     H[H_THETA, ANGLE_TEST:SPEED_TEST] = sec * heading + by_theta, by_theta, sec * heading + by_theta
@@ -278,7 +282,7 @@ def share_across(y):
 @kernel
 def fill_flow_effects(mon, y, rate, dt2, a_max):
     """Fill H and C of the tests of flow, rad; sec_max: 1 / cos(beta_max), beta_max the largest |beta| if beta
-    is off.
+    is off. In the body: acc: `in_plane` of a; side: exp(i beta), and sb its |sin|; secs: sec sec_max.
 
                  ALPHA_FLOW                                BETA_FLOW
         V        sec A_V                                   sec A_V
@@ -298,11 +302,18 @@ def fill_flow_effects(mon, y, rate, dt2, a_max):
     theta    a has the error x g. alpha' takes at most all of it, beta' the part sin(phi) along the second
              axis, and sin(beta) of the rest
     """
-    dt, V, G, H, C = mon.h, speed(y), dt2 * mon.g, mon.initial.H, mon.initial.C
-    A_V, acc, side, sec = dt2 * a_max / V, in_plane(y, mon.a), unit(y[I_BETA]), secant(y[I_BETA])
-    sb, turned, by_phi = abs(side.imag), dt2 * abs(rate), sec * G * np.cos(y[THETA]) / V
+    dt, H, C = mon.h, mon.initial.H, mon.initial.C
+    V = speed(y)
+    G = dt2 * mon.g
+    A_V = dt2 * a_max / V
+    acc = in_plane(y, mon.a)
+    side = unit(y[I_BETA])
+    sb = abs(side.imag)
+    sec = secant(y[I_BETA])
     beta_max = abs(y[I_BETA]) + angle_of_chord(mon.initial.E[H_BETA])
     secs = sec * secant(beta_max)
+    turned = dt2 * abs(rate)
+    by_phi = sec * G * np.cos(y[THETA]) / V
     by_beta = secs * (dt2 * abs(rate.real) + A_V)
     H[:, ALPHA_TEST] = sec * A_V, sec * (A_V + turned * sb), by_beta, by_phi, sec * G / V
     H[:, BETA_TEST] = sec * A_V, turned + A_V * sb, A_V, by_phi, G * (abs(np.sin(y[PHI])) + sb) / V
@@ -331,8 +342,10 @@ def fill_climb_effects(mon, y):
     phi      in altitude' the vertical's part cos(theta) is turned, against `share_across`
     theta    in altitude' the vertical is turned, against v
     """
-    initial, d = mon.initial, down(y)
-    vertical, step = in_plane(y, d), mon.h * speed(y)
+    initial = mon.initial
+    d = down(y)
+    vertical = in_plane(y, d)
+    step = mon.h * speed(y)
     slower = 1.0 - min(initial.E[H_AIRSPEED], 1.0 - 1.0 / MAX_SPEED_RATIO)
     climb = abs(mon.y_pred[ALTITUDE] - y[ALTITUDE]) / slower
     lift = step * np.cos(y[I_BETA]) * abs(vertical)
@@ -363,10 +376,13 @@ def fill_effects(mon, y_now):
              angle) / 2
     """
     dt, y, H, C = mon.h, mon.y_past, mon.initial.H, mon.initial.C
-    V, w = speed(y), abs(y[P]) + abs(y[Q]) + abs(y[R])
-    a_max, rate = max(mon.a_size[0], length(mon.a)), in_plane(y, vector(y))
+    V = speed(y)
+    w = abs(y[P]) + abs(y[Q]) + abs(y[R])
+    a_max = max(mon.a_size[0], length(mon.a))
+    rate = in_plane(y, vector(y))
     dt2 = dt * (1.0 + dt * (a_max / V + w))
-    A, G = dt2 * a_max, dt2 * mon.g
+    A = dt2 * a_max
+    G = dt2 * mon.g
     H[:, SPEED_TEST] = 0.0, A, A, G * share_across(y), G
     pitch = abs(y[THETA])
     mean = min(pitch + 0.5 * angle_of_chord(mon.initial.E[H_THETA]), 0.5 * pitch + 0.25 * np.pi)
@@ -403,11 +419,13 @@ def tighten_bounds(mon):
     for m in range(mon.decay.size):
         ratio = 1.0 + E[H_AIRSPEED]
         for n, (h, first, last) in enumerate(EVIDENCE):
-            C_m, s2 = initial.C_m[n, m], 0.0
+            C_m = initial.C_m[n, m]
+            s2 = 0.0
             for j in range(first, last + 1):
                 effect = allowed_effect(mon, j, m) + 2.0 * initial.d[h] * initial.H_m[h, j, m]
                 s2 += (effect * V if n in (PHI_IN_FLOW, THETA_IN_FLOW) and j != SPEED_TEST else effect) ** 2
-            s, c = np.sqrt(s2), abs(C_m)
+            s = np.sqrt(s2)
+            c = abs(C_m)
             if n == V_IN_DENSITY:
                 s += 2.0 * ratio * allowed_effect(mon, SPEED_TEST, m) / V
             elif h == H_AIRSPEED:

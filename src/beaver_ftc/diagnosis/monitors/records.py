@@ -78,7 +78,7 @@ def configure_sensor_monitor(monitor: np.void, declared: Declared, design: np.vo
     gust_max, gust_change = bound_gusts(air, initial.airspeed_mps, h)
     fill(config, substeps=declared.substeps, has_engine=engine)
     config["D"] = air_rotation_slopes(DesignFunctions(np.array([design])), y)
-    config["y_trim"][3:7] = y[:4]
+    config["y_trim"][3:7] = y[:4]  # alpha, beta, airspeed, dynamic pressure: after the gyros in the readings
     fill(
         monitor, h=h, decay=[exp(-lam * h) for lam in FILTER_POLES_PER_S],
         g=GRAVITY_MPS2 * (1.0 + initial.altitude_m / EARTH_RADIUS_M) ** -2,
@@ -119,7 +119,7 @@ def bound_gusts(air: Dryden, V: float, h: float) -> tuple[float, np.ndarray]:
 
     The speed of a gust is a random walk of intensity Q = 3 sigma^2 V_m / L, m2/s3 (`Dryden.velocity_walk`),
     with V_m = MAX_AIRSPEED_OVER_TRIM V; a filter with a pole of lam 1/s keeps T = h / (1 - exp(-2 lam h)) of
-    it. V m/s: airspeed in trim; h s: a sample.
+    it. V m/s: airspeed in trim; h s: time between two samples.
     """
     Q = air.velocity_walk(V, MAX_AIRSPEED_OVER_TRIM)
     T = [h / (1.0 - exp(-2.0 * lam * h)) for lam in FILTER_POLES_PER_S]

@@ -169,11 +169,13 @@ def predict_readings(mon):
     """
     h, y, past = mon.h, mon.y_pred, mon.y_past
     w = vector(past)
-    s1, s2 = 1.0 + 0.5 * h * w[0], 0.5 * h * w[1]
+    s1 = 1.0 + 0.5 * h * w[0]
+    s2 = 0.5 * h * w[1]
     size = length((s1, s2))
     step = s1 / size, s2 / size
     q = times(attitude(past), step)
-    roll, nose = q[0] ** 2 - q[1].conjugate() ** 2, 2.0 * q[0] * q[1]
+    roll = q[0] ** 2 - q[1].conjugate() ** 2
+    nose = 2.0 * q[0] * q[1]
     y[PHI] = np.angle(roll)
     y[THETA] = np.arcsin(min(max(nose.real, -1.0), 1.0))
     y[PSI] = np.arctan2(nose.imag, abs(q[0]) ** 2 - abs(q[1]) ** 2)
@@ -256,7 +258,8 @@ def bound_acceleration(mon, w_max, e_w):
     attitude gives gravity its direction. The previous acceleration is turned into the present axes, by rates
     with the error e_w, and with it the constant errors.
     """
-    e_a, force2 = EARTH_M_S2 + mon.e_first + mon.h * AB_PAST * e_w * mon.a_size_past, 0.0
+    e_a = EARTH_M_S2 + mon.e_first + mon.h * AB_PAST * e_w * mon.a_size_past
+    force2 = 0.0
     for i in (PHI, THETA, AX, AX + 1, AX + 2):
         e = AB_NOW * mon.e_past[i] + AB_PAST * mon.e_older[i] - mon.const[i]
         e_turn = mon.h * w_max * mon.const[i]
@@ -319,9 +322,11 @@ def bound_flow(mon, y, w_max, e_w):
     h, e, a_size = mon.h, mon.e_past, mon.a_size
     V = max(lowest(mon, y, I_AIRSPEED), MIN_AIRSPEED_MPS)
     sec = secant(highest(mon, y, I_BETA))
-    vane, e_V = e[I_ALPHA] + e[I_BETA], e[I_AIRSPEED]
+    vane = e[I_ALPHA] + e[I_BETA]
+    e_V = e[I_AIRSPEED]
     e_a = bound_acceleration(mon, w_max, e_w)
-    a, growth = a_size[0] + e_a, 1.0 + h * (2.0 * a_size[0] / V + w_max)
+    a = a_size[0] + e_a
+    growth = 1.0 + h * (2.0 * a_size[0] / V + w_max)
     low = max(lowest(mon, y, ALTITUDE), LEAST_HEIGHT_M)
     gust = np.sqrt(max(y[I_AIRSPEED] / mon.max_airspeed_mps, 1.0) * max(mon.low_m / low, 1.0))
     angle = growth * (sec**2 * ((e_a + a * (vane + e_V / V)) / V + w_max * vane) + sec * e_w)
@@ -348,9 +353,12 @@ def bound_density(mon, y):
     """
     past = mon.y_past
     climb = past[I_AIRSPEED] + mon.e_past[I_AIRSPEED] + mon.wind_max + mon.gust_max
-    per_s, per_sample = climb / DENSITY_SCALE_HEIGHT_M, 0.0
+    per_s = climb / DENSITY_SCALE_HEIGHT_M
+    per_sample = 0.0
     for i, power, least in ((I_QDYN, 1.0, MIN_QDYN_PA), (I_AIRSPEED, 2.0, MIN_AIRSPEED_MPS)):
-        e, y1, y0 = mon.const[i], max(y[i], least), max(past[i], least)
+        e = mon.const[i]
+        y1 = max(y[i], least)
+        y0 = max(past[i], least)
         e_log = e * abs(1.0 / y1 - 1.0 / y0) / max(1.0 - e / min(y1, y0), MIN_SHARE_LEFT)
         per_s += power * e_log / mon.h
         per_sample += power * mon.n[i] / max(y[i] - mon.e[i], least)

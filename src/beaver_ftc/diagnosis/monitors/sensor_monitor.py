@@ -93,9 +93,12 @@ def expect_pressure(mon, pressure):
 
 @kernel
 def check_sensors(mon, pred, measured, found, bank, bound, dt, t):
-    """Test the sensors at t s, and replace in `measured` the readings of broken ones.
+    """Test the sensors at t s, and replace in `measured` the readings of broken ones. One call is one sample;
+    a frame has `substeps` samples.
 
-    bank: with the innovation of the elapsed frame, of dt s; bound: with the bound on that innovation.
+    bank: with the innovation of the elapsed frame, of dt s; bound: with the bound on that innovation. Both
+    are new at the first sample of a frame, substep 0. The order matters: all comparisons are with y_past, the
+    sample before, which `store_sample` replaces last, by readings that are then without the broken sensors.
     """
     y = measured.signal
     if not mon.stage:

@@ -159,8 +159,10 @@ def suspect_attitude(mon):
     of the angles' tests refute an error from the start of phi, and of theta; axis: of the gyro that would be
     at fault instead, that with the largest ratio.
     """
-    suspect, ratio = mon.output.suspect, mon.ratio[:ANGLE_TEST]
-    turns, angles = mon.exceeded[:ANGLE_TEST], mon.exceeded[ANGLE_TEST:SPEED_TEST]
+    suspect = mon.output.suspect
+    ratio = mon.ratio[:ANGLE_TEST]
+    turns = mon.exceeded[:ANGLE_TEST]
+    angles = mon.exceeded[ANGLE_TEST:SPEED_TEST]
     refuted = mon.initial.refuted[H_PHI:, ANGLE_TEST:SPEED_TEST]
     frozen = last_frozen(mon, (PHI, THETA, PSI)) >= 0
     worst = np.argmax(ratio)
@@ -190,11 +192,13 @@ def explains_turns(mon, i):
     `gyro_or_attitude.filter_beyond`; E, H: bound on an error of the angle from the start, and its effect
     (initial_errors.py), 0 for psi.
     """
-    own, h = ANGLE_TEST + i, min(H_PHI + i, N_INITIAL - 1)  # psi has no hypothesis: any h, as initial is 0
+    own = ANGLE_TEST + i
+    h = min(H_PHI + i, N_INITIAL - 1)  # psi has no hypothesis: any h, as initial is 0
     initial = mon.initial.E_alarm[h] if i < 2 else 0.0
     tilt = mon.e[PHI] + mon.e[THETA]
     for j in range(3):
-        r, c = mon.r[j], abs(turn_share(mon.y_past, j, i)) + tilt
+        r = mon.r[j]
+        c = abs(turn_share(mon.y_past, j, i)) + tilt
         for m in range(r.size):
             B = mon.B[own, m]
             sound = mon.B[j, m] + initial * mon.initial.H_m[h, j, m]
@@ -213,7 +217,8 @@ def suspect_flow(mon, alarm):
     not move the tests of the attitude. Otherwise a gyro is suspected if its error may be hidden in the test
     of its axis. Cleared sensors (flow_or_force.py) are no suspects.
     """
-    suspect, turns = mon.output.suspect, mon.exceeded[:ANGLE_TEST]
+    suspect = mon.output.suspect
+    turns = mon.exceeded[:ANGLE_TEST]
     by_gyro = alarm > SPEED_TEST and turns.any()
     flow = SENSOR_OF[alarm]
     for i in range(3 if alarm > SPEED_TEST else 0):
@@ -237,7 +242,8 @@ def gyro_hidden(mon, j, i):
     the incidence, r for the sideslip) counts with a share of 1 and k = HIDDEN_FACTOR; for the others k = 1,
     and q does not turn the sideslip.
     """
-    z, t = unit(mon.y_past[I_ALPHA]), np.tan(mon.y_past[I_BETA])
+    z = unit(mon.y_past[I_ALPHA])
+    t = np.tan(mon.y_past[I_BETA])
     share = (t * z.real, 1.0, t * z.imag)[i] if j == ALPHA_TEST else (z.imag, 0.0, 1.0)[i]
     across = i == j - SPEED_TEST  # q (1) for the incidence, r (2) for the sideslip
     k = HIDDEN_FACTOR if across else 1.0

@@ -238,7 +238,11 @@ def fill_bound(bound, model, meas, u):
     eta_e: of `add_declared_bound`; mu: of the map of the model's error, `e_now`; the others: of
     `add_published_bound`, at the worst rates. model: the design model; u (n,) rad: deflections.
     """
-    x, y, err, emap, eta = meas.x, meas.y, bound.declared_errors, bound.error_map, bound.eta_now
+    x = meas.x
+    y = meas.y
+    err = bound.declared_errors
+    emap = bound.error_map
+    eta = bound.eta_now
     eta[:] = 0.0
     if err.given:
         set_air_rotation(err, meas.altitude)
@@ -249,7 +253,9 @@ def fill_bound(bound, model, meas, u):
         look_up_map(emap, x, y, u, err.du)
         for i in range(3):
             eta[i] += emap.e_now[i]
-    c, b, w_E = bound.inertia_coupling_error_share, bound.const, bound.earth_rate_rad_s
+    c = bound.inertia_coupling_error_share
+    b = bound.const
+    w_E = bound.earth_rate_rad_s
     add_published_bound(err.x[WORST], model, c, b, w_E, eta)
 
 
@@ -280,7 +286,8 @@ def configure_bound(bound: np.void, declared: Declared, model: np.void) -> None:
     """Fill in the declared bound and the error of the aircraft's design model: its map, or else one constant
     for all states. model: its record.
     """
-    aircraft, all_types = declared.aircraft, declared.fdi.fault_class == "all"
+    aircraft = declared.aircraft
+    all_types = declared.fdi.fault_class == "all"
     const = np.array(declared.constant_rad_s2)
     if aircraft.file.model_error_map is None:
         const += aircraft.model_error_rad_s2
@@ -296,10 +303,13 @@ def configure_bound(bound: np.void, declared: Declared, model: np.void) -> None:
 
 def fill_errors(err: np.void, declared: Declared, model: np.void) -> None:
     """Fill the declared errors; model: record of the design model."""
-    errors, air, b = declared.sensors, declared.air, declared.aircraft.geometry.span_m
+    errors = declared.sensors
+    air = declared.air
+    b = declared.aircraft.geometry.span_m
     aloft = GUST_LIMIT_SIGMA * air.rotation_limit_rad_s(b)
     dC = declared.coefficients.absolute(declared.aircraft.moments, model["moments"]["value"])
-    dI, du = inertia_bounds(declared.inertia, declared.mass), declared.deflections_rad
+    dI = inertia_bounds(declared.inertia, declared.mass)
+    du = declared.deflections_rad
     err["model"] = model
     err["model"]["moments"]["value"] = np.abs(model["moments"]["value"])
     err["model"]["moments"]["value"][WORST, : dC.size] += dC

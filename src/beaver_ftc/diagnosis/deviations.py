@@ -36,7 +36,8 @@ def plugin_errors(declared: Declared, model: np.ndarray, y: np.ndarray, u: np.nd
     """
     from beaver_ftc.design.context import DeclaredErrors  # for plug-ins alone
 
-    aircraft, errors = declared.aircraft, declared.sensors
+    aircraft = declared.aircraft
+    errors = declared.sensors
     instruments = {}
     for name in ("noise", "bias", "resolution", "slope"):
         kind = "steady" if name == "bias" else name
@@ -134,7 +135,8 @@ def coefficient_bounds(declared: Declared, model: np.void, y: np.ndarray, u: np.
     ph = p b / 2V, qh = q c / V, rh = r b / 2V by the constant errors of the gyros, which acts as a constant
     moment.
     """
-    aircraft, errors = declared.aircraft, declared.sensors
+    aircraft = declared.aircraft
+    errors = declared.sensors
     C = np.abs(model["moments"]["value"][: len(aircraft.moments)])
     dI = InertiaCoefficients(*inertia_bounds(declared.inertia, declared.mass))
     nominal = inertia_coefficients(declared.mass)

@@ -146,7 +146,10 @@ def fill_velocity(gust, y, attitude):
 
     y (5,) and attitude (3,) rad as measured; V m/s: airspeed.
     """
-    mem, V, alpha, beta = gust.memory, y[AIRSPEED], y[ALPHA], y[BETA]
+    mem = gust.memory
+    V = y[AIRSPEED]
+    alpha = y[ALPHA]
+    beta = y[BETA]
     fill_rotation(attitude[0], attitude[1], mem.T)
     mem.heading = attitude[2]
     v = V * np.cos(alpha) * np.cos(beta), V * np.sin(beta), V * np.sin(alpha) * np.cos(beta)
@@ -193,7 +196,9 @@ def fill_axes_rate(gust, dt, V):
     A constant unmeasured gust of deviation sigma = sqrt(Q tau / 2) then changes in body axes at the rate
     sigma C_dot. Over its lag tau this equals a random walk of (C_dot tau)^2 / 2 times its intensity.
     """
-    C, C_dot, fastest = gust.output.C, gust.memory.C_dot, 0.0
+    C = gust.output.C
+    C_dot = gust.memory.C_dot
+    fastest = 0.0
     for i in range(3):
         for j in range(3):
             C_dot[i, j] = (C[i, j] - C_dot[i, j]) / dt
@@ -211,7 +216,10 @@ def advance_gust(gust, y, attitude, dt):
     y (5,) and attitude (3,) rad as measured now. The order matters: f and T in memory are still those of dt s
     ago, until `fill_velocity` replaces T and v; f is replaced later, by `fill_gust_effect`.
     """
-    mem, v, prev, g = gust.memory, gust.memory.v, gust.memory.a_prev, gust.config.gravity
+    mem = gust.memory
+    v = mem.v
+    prev = mem.a_prev
+    g = gust.config.gravity
     turn = wrapped(attitude[2] - mem.heading)
     z = complex(np.cos(turn), -np.sin(turn))
     a = project_gust(mem.f, mem.T, 0), project_gust(mem.f, mem.T, 1), project_gust(mem.f, mem.T, 2) + g
@@ -247,7 +255,9 @@ def update_rotation(gust, dv, psi_dot, dt):
     the heading. If it reaches 1, as when the nose passes the vertical, the vanes mostly measure the turn: the
     yawing gust then only decays, and the sum of changes v_g starts again.
     """
-    cfg, mem, V = gust.config, gust.memory, gust.output.V
+    cfg = gust.config
+    mem = gust.memory
+    V = gust.output.V
     tau_q, tau_r = gust_lag(gust, PITCH, V), gust_lag(gust, YAW, V)
     a_q, a_r = np.exp(-dt / tau_q), np.exp(-dt / tau_r)
     share = psi_dot * psi_dot * cfg.span * cfg.L_gust / (pi * V * V)
@@ -275,7 +285,8 @@ def update_gust_speed(gust, dv, V, dt):
     gust.output.V = V
     if not gust.output.measured:
         return
-    a, V2 = np.exp(-cfg.a_v * dt), 0.0
+    a = np.exp(-cfg.a_v * dt)
+    V2 = 0.0
     mem.start_left *= a * a
     for i in range(3):
         mem.v_g[i] = min(max(a * mem.v_g[i] + dv[i], -cfg.v_max), cfg.v_max)
@@ -382,7 +393,9 @@ def unmeasured_share(gust, j):
     passing: of the pitching gust start_share, of the yawing gust turn_past. The rolling gust has only the
     first term.
     """
-    cfg, mem, V = gust.config, gust.memory, max(gust.output.V, 1.0)
+    cfg = gust.config
+    mem = gust.memory
+    V = max(gust.output.V, 1.0)
     if j == ROLL:
         return min(mem.share[j], 1.0)
     var = cfg.var_V + mem.start_left * cfg.var_v if gust.output.measured else 0.0
@@ -411,7 +424,9 @@ def unmeasured_drift(gust, V, i_1, i_2, as_rolling=False):
     no gust is measured: then Q_j is scaled by (tau_j V / L_roll)^2. What vanes leave of a measured gust has
     an unknown spectrum, so its intensity stays.
     """
-    cfg, C, Q_V = gust.config, gust.output.C, 0.0
+    cfg = gust.config
+    C = gust.output.C
+    Q_V = 0.0
     for j in range(3):
         Q = unmeasured_share(gust, j) * gust.memory.Q[j]
         scale = (gust_lag(gust, j, 1.0) / cfg.L_roll) ** 2 if as_rolling and cfg.coarse_only else 1.0
@@ -476,7 +491,9 @@ def view_drift(gust, V, L_rate, L_force, subtracted):
     them. Otherwise share is 1, and each j adds (tau L_rate' C_dot_j)^2 Q_j / 2 if C turns fast. The forces
     always contain the whole gust.
     """
-    C, mem, Q_V = gust.output.C, gust.memory, 0.0
+    C = gust.output.C
+    mem = gust.memory
+    Q_V = 0.0
     tau = 0.0 if subtracted or not mem.turns_fast else gust_lag(gust, ROLL, V)
     for j in range(3):
         share = unmeasured_share(gust, j) if subtracted else 1.0

@@ -26,8 +26,12 @@ def configure_gust(gust: np.void, declared: Declared) -> None:
     """Fill the record for the declared turbulence. The gust is measured only if the forces are known, by the
     design model or by accelerometers.
     """
-    air, aircraft, span = declared.air, declared.aircraft, declared.aircraft.geometry.span_m
-    output, memory, altitude = gust["output"], gust["memory"], declared.sensors["altitude"]
+    air = declared.air
+    aircraft = declared.aircraft
+    span = declared.aircraft.geometry.span_m
+    output = gust["output"]
+    memory = gust["memory"]
+    altitude = declared.sensors["altitude"]
     known = bool(aircraft.measurable_forces)
     measured = known or output["uses_accelerometers"]
     fill(output, gusty=air.moves, measured=measured)
@@ -51,7 +55,9 @@ def add_gust_noise(
     velocity, integrated over a frame of dt s. The estimate without vanes, `gust_noise` of the forces, has the
     noise of the accelerometers over the effect of the flow angle. y, u: in trim.
     """
-    std, forces, gust = flow_noise(errors, y[AIRSPEED]), stat["forces"], stat["gust"]
+    std = flow_noise(errors, y[AIRSPEED])
+    forces = stat["forces"]
+    gust = stat["gust"]
     span = float(gust["config"]["span"])
     if forces["in_use"] or gust["output"]["uses_accelerometers"]:
         std += INTEGRATION_NOISE_GAIN * errors.each("random", ("az", "ay")) * dt / y[AIRSPEED]
@@ -72,10 +78,14 @@ def configure_gust_speed(gust: np.void, declared: Declared, level: float, V: flo
     acceleration, m/s2, gives it an error b / a. A gust returns to zero at the rate V / L, L m its length, so
     the decaying sum misses the variance sigma^2 a / (a + V / L). The total of both is least near this a.
     """
-    sigma, errors, out = declared.air.sigma_mps, declared.sensors, gust["output"]
+    sigma = declared.air.sigma_mps
+    errors = declared.sensors
+    out = gust["output"]
     if not (out["gusty"] and out["measured"]):
         return
-    rate, of_V, drag = V / SCALE_M, errors["V"], GRAVITY_MPS2 * MAX_DRAG_OVER_WEIGHT
+    rate = V / SCALE_M
+    of_V = errors["V"]
+    drag = GRAVITY_MPS2 * MAX_DRAG_OVER_WEIGHT
     b = 2.0 * EARTH_RATE_RAD_S * V + MAX_PATH_SLOPE_RAD * EARTH_M_S2  # Coriolis; change of gravity with place
     b += GRAVITY_MPS2 * (errors["phi"].steady + errors["theta"].steady)
     if out["uses_accelerometers"]:

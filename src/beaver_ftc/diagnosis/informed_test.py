@@ -73,7 +73,8 @@ class WhiteningFilter:
         tau = np.concatenate((declared.gust_time_s, np.full(3, UNEXPLAINED_MEMORY_S)))
         sigma = np.concatenate((declared.gust_rad_s, context.constant_rad_s2 / np.sqrt(2.0)))
         a = np.exp(-dt / tau)
-        self.F, self.dt = np.diag(np.concatenate((np.ones(6), a))), dt
+        self.F = np.diag(np.concatenate((np.ones(6), a)))
+        self.dt = dt
         self.F[ATTITUDE, RATES] = self.F[RATES, UNEXPLAINED] = dt  # axis by axis
         self.F[np.ix_(RATES, AIR)] = dt * declared.gust_effect
         measured = [i for i in range(3 if broken is None else 6) if i != broken]
@@ -81,7 +82,8 @@ class WhiteningFilter:
         variance = np.concatenate(
             (declared.rate_variance(MIN_GYRO_STD_RAD_S), attitude**2 + MIN_ATTITUDE_STD_RAD**2)
         )
-        self.H, R = np.eye(12)[measured], np.diag(variance[measured])
+        self.H = np.eye(12)[measured]
+        R = np.diag(variance[measured])
         Q = np.diag(np.concatenate(((dt * declared.model_rad_s2) ** 2, np.zeros(3), (1.0 - a**2) * sigma**2)))
         P = np.diag(np.concatenate((variance, sigma**2)))
         for _ in range(_SETTLING_FRAMES):
@@ -161,13 +163,15 @@ def healthy_positions(context: Context, columns: FlightColumns, surface: str) ->
 
     in each JSBSim frame of h s; a bandwidth, or a rate limit, of 0 stands for none.
     """
-    s, commands = context.surfaces.index(surface), columns[f"{surface}_cmd_rad"]
+    s = context.surfaces.index(surface)
+    commands = columns[f"{surface}_cmd_rad"]
     bandwidth = context.declared.bandwidth_rad_s[s]
     rate = context.declared.rate_limit_rad_s[s]
     h = context.dt_s / context.substeps
     a = 1.0 - np.exp(-bandwidth * h) if bandwidth else 1.0
     step = rate * h if rate else np.inf
-    u, positions = columns[f"{surface}_effective_rad"][0], np.empty_like(commands)
+    u = columns[f"{surface}_effective_rad"][0]
+    positions = np.empty_like(commands)
     for k, command in enumerate(np.clip(commands, *context.travel_rad[:, s])):
         for _ in range(context.substeps):
             u = plain(nearer)(u, command, a, step)
@@ -183,8 +187,10 @@ def term_acceleration(
     any."""
     x = np.array([columns[f"{axis}_rad_s"] for axis in AXES])
     names = "alpha_rad", "beta_rad", "airspeed_mps", "qdyn_pa", *aircraft.signals
-    y, design = np.array([columns[name] for name in names]), design_record(aircraft).view(np.recarray)[0]
-    signal, C = np.empty((N_SIGNALS, y.shape[1])), np.zeros((3, 1, y.shape[1]))
+    y = np.array([columns[name] for name in names])
+    design = design_record(aircraft).view(np.recarray)[0]
+    signal = np.empty((N_SIGNALS, y.shape[1]))
+    C = np.zeros((3, 1, y.shape[1]))
     plain(signals)(design.moments, x, y, signal)
     values: dict[str | None, Any] = dict(zip(aircraft.signal_names, signal, strict=False))
     values[term.surface] = deflection

@@ -93,9 +93,11 @@ def configure_prediction(pred: np.void, declared: Declared, travel: np.ndarray) 
     `step`. approaches, steps: the same for the slowest and the fastest actuator by the declared errors.
     omega rad/s, rate rad/s: 0 stands for no lag and for no limit.
     """
-    servos, h = servo_data(declared), 1.0 / declared.rate_hz / declared.substeps
+    servos = servo_data(declared)
+    h = 1.0 / declared.rate_hz / declared.substeps
     slow_to_fast = np.array([-1.0, 0.0, 1.0])  # times the error: slowest, as declared, fastest
-    omega, rate = servos["bandwidth_rad_s"], servos["rate_limit_rad_s"]
+    omega = servos["bandwidth_rad_s"]
+    rate = servos["rate_limit_rad_s"]
     approaches = 1.0 - np.exp(-h * omega[:, None] * (1.0 + np.outer(servos["bandwidth_error"], slow_to_fast)))
     approaches[omega == 0.0] = 1.0  # no lag
     step = np.where(rate > 0.0, rate * h, np.inf)
@@ -121,7 +123,11 @@ def add_to_sums(pred, bound, layout, all_types):
     F <- F + w (f + sum_s G_s u_s)      Gu_s <- Gu_s + w G_s u_s      eGu_s <- eGu_s + w eG_s |u_s|
     G, eG, eta_bar likewise             extra_j <- extra_j + w extra_bound(j)      j: level of travel
     """
-    sums, G, u, w, eG = pred.sums, pred.G, pred.u, pred.w, bound.declared_errors.eG
+    sums = pred.sums
+    G = pred.G
+    u = pred.u
+    w = pred.w
+    eG = bound.declared_errors.eG
     for i in range(3):
         sums.F[i] += w * pred.f[i]
         sums.eta_bar[i] += w * bound.eta_now[i]
@@ -179,7 +185,9 @@ def fill_change_tolerance(pred):
     1 / n. The mean effect of the fault over the frame then exceeds its extremes, which are computed with the
     mean of all steps, by at most |z0 - z| / n. Gu_first is w z0, and Gu - Gu_first is (1 - w) z.
     """
-    w, Gu, first = pred.w, pred.sums.Gu, pred.sums.Gu_first
+    w = pred.w
+    Gu = pred.sums.Gu
+    first = pred.sums.Gu_first
     for i in range(3):
         for s in range(pred.u.size):
             pred.means.e_Gu[i, s] = abs(first[i, s] - (Gu[i, s] - first[i, s]) * w / (1.0 - w))

@@ -362,7 +362,8 @@ def certificate_arrays(
         signature, bounded        of its hypotheses, rad/s2; bound eta of its rates, (3,) rad/s2
         air, leap                 gust estimate: acc_mean, (3,) rad/s2, and var_turn, (3, 3) (rad/s2)2
     """
-    est, srf = fdi["isolation"]["estimator"][:n_estimators], fdi["types"]["surface"]
+    est = fdi["isolation"]["estimator"][:n_estimators]
+    srf = fdi["types"]["surface"]
     always = {
         "offset": est["effect"]["h"], "slope": est["effect"]["Z"], "spread": est["effect"]["r"],
         "excluded": est["excluded"], "types": srf["sets"]["excluded"],
@@ -374,7 +375,8 @@ def certificate_arrays(
     early = {"reach_low": est["reach_lo"], "reach_high": est["reach_hi"]}
     if has_statistical_detector:
         stat = fdi["statistical"]
-        blk, gust = stat["block"], stat["gust"]["output"]
+        blk = stat["block"]
+        gust = stat["gust"]["output"]
         early |= {name: blk[name] for name in RECORDED_BLOCK_FIELDS}
         early |= {"signature": blk["hypothesis"]["signature"], "bounded": stat["rows"]["eta"][0, :3]}
         early |= {"air": gust["acc_mean"], "leap": gust["var_turn"]}

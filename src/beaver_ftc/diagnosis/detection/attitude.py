@@ -79,7 +79,9 @@ BLOCK_ROWS = (0, 0, 1)  # row of roll, pitch and yaw in the block that has the a
 @sized
 def attitude_dtype(capacity: BlockCapacity) -> np.dtype:
     """The comparison of attitude and rates, for the capacity of a block of the rates."""
-    n, n_h, n_a = capacity.max_regressors + N_FURTHER, capacity.max_hypotheses, len(LEAK_TIMES_S)
+    n = capacity.max_regressors + N_FURTHER
+    n_h = capacity.max_hypotheses
+    n_a = len(LEAK_TIMES_S)
     return record(
         enabled=int, level=float,  # level of both sums, standard deviations
         D=(3, 3), R=float, a=n_a, b=float,  # 1/s; variance of v, rad2; factors per frame
@@ -106,8 +108,10 @@ def configure_attitude(att: np.void, D: np.ndarray, errors: SensorErrors, margin
     gives the first term, and dt times the noise of a gyro. steady: constant error of a gyro, rad/s; drift: of
     the attitude, rad/s; e_phi, e_theta: constant errors of phi and theta, rad.
     """
-    angles, gyros = [errors[name] for name in ANGLES], [errors[name] for name in AXES]
-    v, w = max(angle.random for angle in angles), max(gyro.random for gyro in gyros)
+    angles = [errors[name] for name in ANGLES]
+    gyros = [errors[name] for name in AXES]
+    v = max(angle.random for angle in angles)
+    w = max(gyro.random for gyro in gyros)
     a = np.exp(-dt_s / np.array(LEAK_TIMES_S))
     drift = max(abs(getattr(errors.declared, name).drift_rad_s) for name in ANGLES)
     P_start = v**2, w**2, DRIFT_PRIOR_RAD_S2**2

@@ -50,7 +50,8 @@ _ALPHA_GRID, _BETA_GRID = ((c[0], c[1] - c[0], len(c)) for c in (ALPHA_CENTRES_R
 
 def configure_fdae(fdae: np.void, declared: Declared) -> None:
     """Fill in the estimator's pole, and how its network learns."""
-    control, lam = declared.control, declared.fdi.detection_pole_per_s
+    control = declared.control
+    lam = declared.fdi.detection_pole_per_s
     fill(fdae["config"], pole_per_s=lam, a=exp(-lam * (1.0 / declared.rate_hz)))
     fill(
         fdae["network"]["config"], gain=control.network_gain_per_s2, leak=control.network_leak_per_s,
@@ -155,7 +156,8 @@ def advance_fdae(fdae, bank, bound, x, F, detected, leaks, dt):
     F (3,) rad/s2: with the isolated fault once there is one. mu: that of filter 0 of the bank, which is at
     this frame. An error of a gyro adds at most m + n to a residual.
     """
-    M, mu = fdae.memory, fdae.output.threshold
+    M = fdae.memory
+    mu = fdae.output.threshold
     if detected:
         train_network(fdae.network, fdae.output.residual, mu, leaks, dt)
     for i in range(3):

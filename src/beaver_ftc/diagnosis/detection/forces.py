@@ -143,7 +143,9 @@ def fill_angle_rates(forces, g, meas):
     a (3,) m/s2: reading of the accelerometers plus gravity, of size g m/s2, in body axes; p, q, r rad/s:
     rates; V m/s: airspeed; c, s: cosine and sine of alpha.
     """
-    a, V, beta = meas.force, meas.y[AIRSPEED], meas.y[BETA]
+    a = meas.force
+    V = meas.y[AIRSPEED]
+    beta = meas.y[BETA]
     p, q, r = meas.x[0], meas.x[1], meas.x[2]
     phi, th = meas.attitude[0], meas.attitude[1]
     c, s = np.cos(meas.y[ALPHA]), np.sin(meas.y[ALPHA])

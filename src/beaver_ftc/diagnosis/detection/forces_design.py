@@ -34,8 +34,10 @@ def configure_forces(
 
     slopes (3, y.size): of the angular accelerations with y, in trim. dt s a frame.
     """
-    stat, err = fdi["statistical"], fdi["bound"]["declared_errors"]
-    aircraft, forces = declared.aircraft, stat["forces"]
+    stat = fdi["statistical"]
+    err = fdi["bound"]["declared_errors"]
+    aircraft = declared.aircraft
+    forces = stat["forces"]
     CY_bdot = sum(
         declared.terms[term.name]
         for term in aircraft.forces
@@ -64,9 +66,13 @@ def _configure_force(
     that drift; walk rad2/s: intensity of the change of that angle by gusts; std m/s2: noise of the
     accelerometer.
     """
-    y, aircraft, errors = trim[1], declared.aircraft, declared.sensors
-    forces, cfg = stat["forces"], stat["gust"]["config"]
-    f, force = forces["component"][i], MEASURED_FORCES[i]
+    y = trim[1]
+    aircraft = declared.aircraft
+    errors = declared.sensors
+    forces = stat["forces"]
+    cfg = stat["gust"]["config"]
+    f = forces["component"][i]
+    force = MEASURED_FORCES[i]
     per_C = y[QDYN] * cfg["S_m"] * forces["c_inv"]
     f_all = per_C * _force_slopes(declared, force.coefficient, trim)
     f_y = f_all[:-1]
@@ -147,9 +153,13 @@ def _configure_columns(
         whole force       always                    mass, slope of the sensor        predict_force, n_Z - 1
         drift             always                    rad/s                            update_forces, n_Z
     """
-    rows, f, force = stat["rows"], stat["forces"]["component"][i], MEASURED_FORCES[i]
-    tol_C, errors = declared.coefficients.largest, declared.sensors
-    vane, acc = errors[force.vane_name], errors[force.accelerometer]
+    rows = stat["rows"]
+    f = stat["forces"]["component"][i]
+    force = MEASURED_FORCES[i]
+    tol_C = declared.coefficients.largest
+    errors = declared.sensors
+    vane = errors[force.vane_name]
+    acc = errors[force.accelerometer]
     tol_q = errors["qdyn"].steady / y[QDYN] + errors["qdyn"].slope
     tol = [
         (tol_C + tol_q + vane.slope) * abs(declared.terms[t.name]) + t.is_constant * vane.steady * abs(C_vane)
@@ -171,7 +181,8 @@ def _configure_columns(
 def _force_coefficient(declared: Declared, name: str, state: TrimState) -> float:
     """The force coefficient `name` at x (3,) rad/s, y, u rad."""
     x, y, u = state
-    aircraft, geometry = declared.aircraft, declared.aircraft.geometry
+    aircraft = declared.aircraft
+    geometry = declared.aircraft.geometry
     V = y[AIRSPEED]
     rates = x * (geometry.span_m / (2.0 * V), geometry.chord_m / V, geometry.span_m / (2.0 * V))
     names = (*aircraft.surfaces, *aircraft.signals, "alpha", "beta", "ph", "qh", "rh", SIDESLIP_RATE)

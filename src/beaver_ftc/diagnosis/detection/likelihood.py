@@ -169,7 +169,8 @@ def new_filter_block(P: np.ndarray, R: np.ndarray) -> np.ndarray:
 
     P (2 n, 2 n): covariance of rates and their drift; R (n,): variance of a reading's noise.
     """
-    blocks, n = np.zeros(1, block_dtype(BlockCapacity(1, 1))), len(R)
+    blocks = np.zeros(1, block_dtype(BlockCapacity(1, 1)))
+    n = len(R)
     b, x, d = blocks[0], slice(0, n), slice(n, 2 * n)
     b["n"], b["axes"], b["R_y"][:n] = n, (0, 1), R
     for name, i, j in (("P_xx", x, x), ("P_xd", x, d), ("P_dd", d, d)):
@@ -219,7 +220,8 @@ def bound_responses(b, dt):
     g_0 s: response to a unit constant that the drift leaves in the end, on an axis by itself; c_ij: cofactors
     of K_d, det: its determinant.
     """
-    K_d, lost = b.K_d, 1.0 - b.a
+    K_d = b.K_d
+    lost = 1.0 - b.a
     det = K_d[0, 0] * K_d[1, 1] - K_d[0, 1] * K_d[1, 0] if b.n > 1 else K_d[0, 0]
     for i in range(b.n):
         b.eta_r[i] = 0.0
@@ -263,7 +265,11 @@ def accumulate_tests(b, t, n, dt, decay):
     Letters as at the top; N_c is `correlation_from_coarse_gust`. g_s follows `whiten_step` with v = s, which
     is written out for vectors of tests. In a block of one axis all values of a second axis are zero.
     """
-    x, g_s, w, a, N_c = t.x_s, t.g_s, t.w, b.a, t.correlation_from_coarse_gust
+    x = t.x_s
+    g_s = t.g_s
+    w = t.w
+    a = b.a
+    N_c = t.correlation_from_coarse_gust
     for i in range(b.n):
         for k in range(n):
             g_s[i, k] = x[i, k] + dt * (t.s[i, k] - x[D0 + i, k])
@@ -275,9 +281,15 @@ def accumulate_tests(b, t, n, dt, decay):
             for k in range(n):
                 x[i, k] -= K_x * g_s[j, k]
                 x[D0 + i, k] += K_d * g_s[j, k]
-        S_0, S_1, g, p, g_c = b.S_inv[i, 0], b.S_inv[i, 1], b.g[i], b.p[i], b.g_c[i]
+        S_0 = b.S_inv[i, 0]
+        S_1 = b.S_inv[i, 1]
+        g = b.g[i]
+        p = b.p[i]
+        g_c = b.g_c[i]
         keep = 1.0 if i else decay  # the sums of both axes decay once a frame
-        c, r, r_w = b.eta_0[i], b.eta_r[i], b.eta_rate * b.eta_r[i]
+        c = b.eta_0[i]
+        r = b.eta_r[i]
+        r_w = b.eta_rate * b.eta_r[i]
         for k in range(n):
             w_i = S_0 * g_s[0, k] + S_1 * g_s[1, k]
             t.correlation[k] = keep * t.correlation[k] + w_i * g
@@ -298,10 +310,14 @@ def accumulate_regressors(b, t, R, n, decay):
 
     R_j is N_j in statistical.md.
     """
-    w, e_R, g = t.w, t.e_R, b.g_Z
+    w = t.w
+    e_R = t.e_R
+    g = b.g_Z
     e_R[:n] = 0.0
     for j in range(b.n_Z):
-        g_0, g_1, tol_j = g[j, 0], g[j, 1], b.tol[j]
+        g_0 = g[j, 0]
+        g_1 = g[j, 1]
+        tol_j = b.tol[j]
         for k in range(n):
             R_j = decay * R[j, k] + (w[0, k] * g_0 + w[1, k] * g_1)
             R[j, k] = R_j
@@ -315,7 +331,8 @@ def accumulate_evidence(b, dt, decay):
     for h in range(b.n_h):
         update_signatures(b.hypothesis[h], b.tests[h // GROUP_SIZE], (h % GROUP_SIZE) * N_SLOTS)
     for i in range(n_test_groups(b.n_h)):
-        t, n = b.tests[i], tests_in_group(b, i)
+        t = b.tests[i]
+        n = tests_in_group(b, i)
         accumulate_tests(b, t, n, dt, decay)
         accumulate_regressors(b, t, b.R[i], n, decay)
 
@@ -376,7 +393,10 @@ def evaluate_tests(b, t, n, without_eta, mapped):
     without_eta: the bounds on the ratios leave out the room. mapped: for hypotheses that have no sign they
     include it even then, because the mapped error of a model is large and lasting.
     """
-    z, share, r0, r1 = b.alarm_level, b.noise_share, b.eta_r[0], b.eta_r[1]
+    z = b.alarm_level
+    share = b.noise_share
+    r0 = b.eta_r[0]
+    r1 = b.eta_r[1]
     for k in range(n):
         N, D, sign = t.correlation[k], t.information[k], t.supporting_correlation_sign[k]
         signed = sign != 0.0
@@ -406,7 +426,8 @@ def evaluate_hypotheses(b, decay=0.0, mapped=False):
     for i in range(n_test_groups(b.n_h)):
         evaluate_tests(b, b.tests[i], tests_in_group(b, i), decay > 0.0, mapped)
     for h, hyp in enumerate(b.hypothesis[: b.n_h]):
-        t, first = b.tests[h // GROUP_SIZE], (h % GROUP_SIZE) * N_SLOTS
+        t = b.tests[h // GROUP_SIZE]
+        first = (h % GROUP_SIZE) * N_SLOTS
         k_best = first
         hyp.score, hyp.llr_lo, hyp.llr_hi = 0.0, 0.0, decay * hyp.llr_hi
         for k in range(first, first + N_SLOTS):

@@ -141,7 +141,9 @@ def turn_view(view, rows, gust):
 
         |m|' e / max(|g| - |col|' e, MIN_NORM_SHARE |g|)
     """
-    m, col, c = view.block.m[0], view.col, view.nulled
+    m = view.block.m[0]
+    col = view.col
+    c = view.nulled
     i, k, j = view.places[0], view.places[1], view.places[2]
     g_i, g_k, g_j = rows.G[c, i], 0.0, rows.G[c, j]
     q_i, q_k = 0.0, 1.0
@@ -174,7 +176,8 @@ def fill_view_drift(view, q, gust, subtracted, forces, V):
     q: see NOISE_RECORD. gust: the gust estimate that gives L and the variance by turns; subtracted: the one
     that gives the drift, which is that of this view's source.
     """
-    b, L = view.block, gust.output.rate_damping
+    b = view.block
+    L = gust.output.rate_damping
     m = row_of(b.m, 0)
     Q_d = q * max(b.eta[0], likelihood.MIN_ETA_RAD_S2) ** 2
     for i, f in enumerate(forces.component):

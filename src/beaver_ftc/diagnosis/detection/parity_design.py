@@ -198,7 +198,8 @@ def _configure_columns(
     """Fill the regressors that a view sees: those of its rates, of its force, of the flow angle from inertial
     motion, and the leak, which is worked out in flight.
     """
-    b, columns = view["block"], list(rates["columns"][: rates["n_Z"]])
+    b = view["block"]
+    columns = list(rates["columns"][: rates["n_Z"]])
     if not columns and not d.by_force:
         return
     if d.by_force:

@@ -134,7 +134,8 @@ def configure_rows(stat: np.void, errors: SensorErrors, tol: np.ndarray, err: np
     rows["R"][:3] = [max(errors[name].random, MIN_GYRO_STD_RAD_S) ** 2 for name in AXES]
     rows["tol"][:n] = tol
     rows["first"] = n + N_INPUT_READINGS + np.array([0, MAX_FORCE_REGRESSORS + 1])
-    of_readings, sigma = rows["tol"][n : n + N_INPUT_READINGS], noise["sigma"]
+    of_readings = rows["tol"][n : n + N_INPUT_READINGS]
+    sigma = noise["sigma"]
     for name, j in _READING_OF.items():
         of_readings[j], sigma[j] = errors[name].steady, errors[name].random
     # kw0 bounds the whole error of the power, so the noise is that over the standard deviations in a bound.
@@ -176,7 +177,10 @@ def add_constants(w, noise, rows, err, model, meas, u):
 
     with dm the change of the monomials by ds (`fill_signal_slopes`).
     """
-    y, tab, C, n = meas.y, model.moments, noise.C, rows.n
+    y = meas.y
+    tab = model.moments
+    C = noise.C
+    n = rows.n
     if n == 0:
         return
     evaluate(tab, meas.x, y)

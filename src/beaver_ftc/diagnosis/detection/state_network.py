@@ -67,7 +67,9 @@ def evaluate_state_network(net, main, x, y, u):
     for i in range(3):
         for j, v in enumerate((y[ALPHA] if i == PITCH else y[BETA], x[i], u[main[i]])):
             fill_input_basis(net, i, j, v)
-        n, fhat, part = 0, 0.0, net.memory.part
+        n = 0
+        fhat = 0.0
+        part = net.memory.part
         for a in range(N_CENTRES[0]):
             for b in range(N_CENTRES[1]):
                 for c in range(N_CENTRES[2]):

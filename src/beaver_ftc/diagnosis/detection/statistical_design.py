@@ -138,8 +138,12 @@ def configure_statistics(fdi: np.void, declared: Declared, model: np.void, trim:
     stat["alarm"]["detected_at_s"] = -1.0
     if settings is None or not fdi["config"]["enabled"]:  # a plug-in diagnoses, or nothing does
         return
-    cfg, gust, aircraft, errors = stat["test"], stat["gust"], declared.aircraft, declared.sensors
-    rate_hz, V = declared.rate_hz, float(trim[1][AIRSPEED])
+    cfg = stat["test"]
+    gust = stat["gust"]
+    aircraft = declared.aircraft
+    errors = declared.sensors
+    rate_hz = declared.rate_hz
+    V = float(trim[1][AIRSPEED])
     dt_s = 1.0 / rate_hz
     rate = eta_rate(settings, aircraft, dt_s)
     fill(cfg, enabled=1, w=1.0 / declared.substeps)
@@ -175,7 +179,8 @@ def configure_statistics(fdi: np.void, declared: Declared, model: np.void, trim:
 
 def _configure_levels(cfg: np.void, declared: Declared, settings: Statistical, n_tests: int) -> None:
     """Fill the level of the alarm, the margin of isolation, and how evidence is forgotten and bounded."""
-    aircraft, rate_hz = declared.aircraft, declared.rate_hz
+    aircraft = declared.aircraft
+    rate_hz = declared.rate_hz
     # margin: the difference z_m^2 / 2 of log-likelihood ratios that noise exceeds in a second with
     # probability `misnaming`; z_m: the quantile of its share in one test
     fill(
@@ -208,8 +213,10 @@ def _configure_lengths(stat: np.void, V: float, rate_hz: float) -> None:
 
     gust_m m: correlation length of the gust on these axes, 0 in still air; the length is at most longest_m.
     """
-    cfg, out = stat["gust"]["config"], stat["gust"]["output"]
-    roll_m, rotations_m = float(cfg["L_roll"]) if out["gusty"] else 0.0, rotation_lengths(cfg["span"])
+    cfg = stat["gust"]["config"]
+    out = stat["gust"]["output"]
+    roll_m = float(cfg["L_roll"]) if out["gusty"] else 0.0
+    rotations_m = rotation_lengths(cfg["span"])
     lengths = [(stat["block"][-1], min(rotations_m) if cfg["coarse_only"] else roll_m, roll_m)]
     if out["gusty"] and not out["measured"]:
         lengths.append((stat["block"][likelihood.PITCH_BLOCK], rotations_m[1], rotations_m[1]))
@@ -225,7 +232,9 @@ def _configure_blocks(stat: np.void, declared: Declared, rate: float, dt_s: floa
     rate: largest change of the bounded uncertainty within a frame, over its bound. If a loss is declared
     abrupt, it neither grows nor ends, and the hypotheses of this are left out.
     """
-    aircraft, cfg, rows = declared.aircraft, stat["test"], stat["rows"]
+    aircraft = declared.aircraft
+    cfg = stat["test"]
+    rows = stat["rows"]
     losses = [aircraft.surfaces.index(name) for name in aircraft.class_of_losses]
     left_out = (GROWING_LOSS, LOSS_END) if declared.fdi.fault_profile == "abrupt" else ()
     cfg["n_scores"] = len(losses) + len(AXES)

@@ -193,7 +193,8 @@ def configure_tones(c: np.void, false_alarm: float, V: float, rate: float, dt: f
     rate: largest rate of change of a bounded uncertainty, bounds per second. dt s a frame.
     """
     stride = max(round(TONE_INTERVAL_S / dt), 1)
-    z, a = np.exp(1j * TONES_RAD_S * dt), exp(-stride * dt / TONE_MEMORY_S)
+    z = np.exp(1j * TONES_RAD_S * dt)
+    a = exp(-stride * dt / TONE_MEMORY_S)
     rho = a * z**stride
     # The variances of the two parts differ by |sum exp(2 (i w - 1 / T) t)| / sum exp(-2 t / T).
     v_share = 0.5 + 0.5 * (1.0 - a**2) / np.abs(1.0 - rho**2)

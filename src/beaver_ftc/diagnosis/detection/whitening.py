@@ -148,7 +148,8 @@ def whiten_step(b, x, v, dt, g):
     for i in range(b.n):
         g[i] = x[i] + dt * (v[i] - x[D0 + i])
     for i in range(b.n):
-        e, d = g[i], 0.0
+        e = g[i]
+        d = 0.0
         for j in range(b.n):
             e -= b.K_x[i, j] * g[j]
             d += b.K_d[i, j] * g[j]
@@ -174,7 +175,9 @@ def update_calm_part(b, dt):
     this frame. lam is the estimate of least squares with a prior for calm air, CALM_STDS standard deviations
     larger.
     """
-    p, g, decay = b.p, b.g, np.exp(-dt / CALM_MEMORY_S)
+    p = b.p
+    g = b.g
+    decay = np.exp(-dt / CALM_MEMORY_S)
     b.pg *= decay
     b.pp *= decay
     for i in range(b.n):

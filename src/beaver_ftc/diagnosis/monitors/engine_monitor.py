@@ -43,7 +43,8 @@ def yaw_per_thrust(aircraft: Aircraft) -> float:
 
 def configure_engine_monitor(config: np.void, aircraft: Aircraft) -> None:
     """Fill `config` of the record; it stays empty where the symmetry of the engines is not measured."""
-    error_map, signals = aircraft.file.model_error_map, list(aircraft.signals)
+    error_map = aircraft.file.model_error_map
+    signals = list(aircraft.signals)
     if error_map is None or not error_map.knows_engines or not {THRUST_SIGNAL, YAW_SIGNAL} <= set(signals):
         return
     i_T, i_n = (DPT + signals.index(name) for name in (THRUST_SIGNAL, YAW_SIGNAL))

@@ -206,7 +206,9 @@ def contradicted(mon, y):
     if alarm == BETA_TEST or mon.exceeded[other]:
         return False
     h = alarm - SPEED_TEST
-    e, r, B = mon.initial.E_alarm[h], mon.r[alarm], mon.B[alarm]
+    e = mon.initial.E_alarm[h]
+    r = mon.r[alarm]
+    B = mon.B[alarm]
     # log(density) changes by twice the relative change of the airspeed
     share = 2.0 * (1.0 - min(e, 1.0)) / speed(y)
     for m, climb in enumerate(mon.climb):

@@ -73,8 +73,10 @@ def configure_sensor_monitor(monitor: np.void, declared: Declared, design: np.vo
     config["enabled"] = declared.monitors_sensors
     if not declared.monitors_sensors:
         return
-    initial, air = cast("Any", declared.initial), declared.air  # whose keys the aircraft names
-    engine, h = declared.aircraft.has_engine_instruments, 1.0 / declared.rate_hz / declared.substeps
+    initial = cast("Any", declared.initial)  # the aircraft names its keys
+    air = declared.air
+    engine = declared.aircraft.has_engine_instruments
+    h = 1.0 / declared.rate_hz / declared.substeps
     gust_max, gust_change = bound_gusts(air, initial.airspeed_mps, h)
     fill(config, substeps=declared.substeps, has_engine=engine)
     config["D"] = air_rotation_slopes(DesignFunctions(np.array([design])), y)
@@ -94,7 +96,9 @@ def configure_sensor_monitor(monitor: np.void, declared: Declared, design: np.vo
 def configure_errors(monitor: np.void, declared: Declared) -> None:
     """Fill the declared errors of the readings, and the number of identical samples from which each is
     frozen; a sample is a JSBSim frame. The attitude is noisy if an error of it changes: worst > steady."""
-    config, sensors, h = monitor["config"], declared.sensors, float(monitor["h"])
+    config = monitor["config"]
+    sensors = declared.sensors
+    h = float(monitor["h"])
     fill(monitor, **{name: sensors.each(kind, SENSORS) for name, kind in ERRORS.items()})
     drifts = [getattr(getattr(sensors.declared, name), "drift_rad_s", 0.0) for name in SENSORS]
     monitor["drift"] = max(map(abs, drifts))

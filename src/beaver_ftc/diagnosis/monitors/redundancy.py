@@ -393,7 +393,10 @@ def filter_test(mon, j):
 
     b: per_s, in the unit of the residual over s; n, n_past: per_sample of this sample and of the one before.
     """
-    r, e, B, n = mon.r[j], mon.e_sum[j], mon.B[j], mon.per_sample[j]
+    r = mon.r[j]
+    e = mon.e_sum[j]
+    B = mon.B[j]
+    n = mon.per_sample[j]
     mon.ratio[j] = 0.0
     leak(r, mon.decay, mon.residual[j])
     for m, a in enumerate(mon.decay):
@@ -427,7 +430,9 @@ def compare_duplicates(mon, y, fresh):
     tolerance + e_i + e_j. `agreed` records the pairs that have agreed before any alarm.
     """
     for d in range(DUPLICATE.size):
-        i, j, test = DUPLICATE[d], COUNTERPART[d], N_EQUATIONS + d
+        i = DUPLICATE[d]
+        j = COUNTERPART[d]
+        test = N_EQUATIONS + d
         mon.ratio[test] = 0.0
         if fresh[i - N_IN_EQUATIONS]:
             r = wrapped(y[i] - y[j]) if PHI <= j <= PSI else y[i] - y[j]

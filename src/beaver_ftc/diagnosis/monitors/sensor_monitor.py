@@ -260,7 +260,8 @@ def replace_readings(mon, pred, measured):
     Accelerometers, from AX on, are not replaced: none of them is used once one of them may be broken. The
     slipstream, which airspeed, dynamic pressure and the engine's sensors give, follows the replaced readings.
     """
-    o, unused = mon.output, mon.output.is_reading_unused
+    o = mon.output
+    unused = o.is_reading_unused
     for i in range(N_SENSORS):
         unused[i] |= measured.missing[i]
         if unused[i] and i < AX:

@@ -130,7 +130,9 @@ def suspect_duplicate(mon, d):
     B_i: bound of the reading's own test; e_i: bound on the error of a sound reading.
     """
     suspect = mon.output.suspect
-    i, own_test, j = COUNTERPART[d], COUNTERPART_TEST[d], N_EQUATIONS + d
+    i = COUNTERPART[d]
+    own_test = COUNTERPART_TEST[d]
+    j = N_EQUATIONS + d
     least_error = abs(mon.residual[j]) - mon.B[j, 0]
     hidden = least_error <= HIDDEN_FACTOR * max(mon.B[own_test, 0], mon.e[i])
     suspect[DUPLICATE[d]] = not mon.exceeded[own_test]
@@ -262,7 +264,10 @@ def suspect_accelerometers(mon):
     the flow. plane: dv turned by beta; its imaginary part is along the second body axis. body: then turned by
     alpha; its parts are along the first and the third body axis.
     """
-    y, dV, da, db = mon.y_past, mon.flow[0], mon.flow[1], mon.flow[2]
+    y = mon.y_past
+    dV = mon.flow[0]
+    da = mon.flow[1]
+    db = mon.flow[2]
     V = speed(y)
     frozen = last_frozen(mon, FORCES)
     plane = complex(dV.r_sum, V * db.r_sum) * unit(y[I_BETA])

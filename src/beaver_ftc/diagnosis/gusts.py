@@ -3,9 +3,9 @@
 A vertical gust that varies along the flight path acts like a pitch rate q_g, a lateral one like a yaw rate
 r_g, both rad/s [MIL-F-8785C, 3.7]:
 
-    tau_q q_g' + q_g = w_g' / V,  tau_q = 4 b / pi V        tau_r r_g' + r_g = v_g' / V,  tau_r = 3 b / pi V
+    tau_q q_g' + q_g = g_z' / V,  tau_q = 4 b / pi V        tau_r r_g' + r_g = g_y' / V,  tau_r = 3 b / pi V
 
-w_g, v_g, m/s, are the gust downwards and to the right; b, m, is the span; V, m/s, the speed. Vanes and
+g_z, g_y, m/s, are the gust downwards and to the right; b, m, is the span; V, m/s, the speed. Vanes and
 airspeed give the aircraft's velocity relative to the moving air. Forces, attitude and gravity predict how
 this velocity would change in still air. The predicted minus the measured velocity is the change of the gust:
 air that begins to move downwards lowers the aircraft's downward velocity relative to it. The rolling gust,
@@ -31,9 +31,9 @@ v' = v + dt (3 a - a_prev) / 2.
 gusts_design.py fills the record from what a scenario declares.
 
 Letters of the kernels. i and k are body axes, j an axis of the gusts, about which they roll, pitch or yaw. An
-index _q or _r at the end of a letter is pitch or yaw.
+index _q or _r at the end of a letter is pitch or yaw. w holds q_g and r_g.
 
-    v, v_g         velocity relative to the air; gust since the start, m/s in level axes
+    v, v_g         velocity relative to the air; gust (3,) since the start, m/s in level axes
     V              speed relative to the mean air, m/s
     f, a           specific force, m/s2 in body axes; acceleration in level axes
     T, C           rotations (3, 3): from level axes to body axes; from the gusts' axes to body axes

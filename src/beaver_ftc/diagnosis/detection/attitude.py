@@ -19,8 +19,7 @@ what was before the fault only adds noise:
 
 Unknown constants c_j, |c_j| <= tol_j, multiply known accelerations r_j: the errors of coefficients, and for
 each axis by itself the bounded uncertainty and errors of the damping. Through the same filter they add
-c_j z_j and c_j R_j to the sums.
-Without a fault of a surface
+c_j z_j and c_j R_j to the sums. Without a fault of a surface
 
     (|z| - sum_j tol_j |z_j|) sqrt(1 - a^2)          (|N| - sum_j tol_j |R_j|) / sqrt M
 

@@ -239,12 +239,13 @@ def fill_attitude_effects(mon, y, w):
     psi' = turn.imag / cos(theta). w: bound on the rate, rad/s; second = (dt w)^2, rad2: the axes turn during
     the step.
 
-    Turning. phi off by x: (q, r) is turned about the first axis, which changes it by x |(q, r)|. theta off:
-    the vertical, about which the aircraft turns at psi', likewise.
-
-    Angles. phi off: no Euler angle changes by more than the body turns over cos(theta). theta off by x:
-    phi' = p + turn.imag tan(theta), psi' = turn.imag / cos(theta). The tangents, or secants, of reading and
-    truth differ by at most x over both cosines; in theta' there is no theta.
+                     phi off by x                             theta off by x
+        turning      (q, r) is turned about the first axis,   the vertical, about which the aircraft turns at
+                     which changes it by x |(q, r)|           psi', is turned, which changes it by x psi'
+        angles       no Euler angle changes by more than      phi' = p + turn.imag tan(theta) and
+                     the body turns, over cos(theta)          psi' = turn.imag / cos(theta): tangents, and
+                                                              secants, of reading and truth differ by at most
+                                                              x over both cosines; theta' has no theta
     """
     dt, H, C = mon.h, mon.initial.H, mon.initial.C
     rates = vector(y)[1]
@@ -291,16 +292,16 @@ def fill_flow_effects(mon, y, rate, dt2, a_max):
         phi      sec G cos(theta) / V                      sec G cos(theta) / V
         theta    sec G / V                                 G (|sin(phi)| + |sin(beta)|) / V
 
-    V        both have the part a / V, and a / truth = (1 + x) a / reading
-    alpha    in alpha' (a_z, a_x) / (V cos(beta)) and tan(beta) (p, r) are turned by alpha; in beta' (p, r)
-             and sin(beta) (a_x, a_z) / V. The rate changes beta' by
-             x (rate.real cos(error / 2) + rate.imag sin(error / 2)), the force with either sign
-    beta     in alpha' tangents, and secants, of reading and truth differ by x over both cosines: the rate
-             changes it by x cos(error / 2) rate.real over both, the force with either sign. In beta' a is
-             turned by beta
-    phi      a has the error x g cos(theta), of which both take at most all
-    theta    a has the error x g. alpha' takes at most all of it, beta' the part sin(phi) along the second
-             axis, and sin(beta) of the rest
+    V        alpha' and beta' have the part a / V, and a / truth = (1 + x) a / reading
+    alpha    alpha' contains (a_z, a_x) / (V cos(beta)) and tan(beta) (p, r), both turned by alpha. beta'
+             contains (p, r) and sin(beta) (a_x, a_z) / V, both turned by alpha. The rate changes beta' by
+             x (rate.real cos(error / 2) + rate.imag sin(error / 2)); the force has either sign
+    beta     alpha' contains tan(beta) and 1 / cos(beta). Those of reading and truth differ by at most x over
+             both cosines: the rate changes alpha' by x cos(error / 2) rate.real over both cosines, and the
+             force has either sign. beta' contains a turned by beta
+    phi      a has the error x g cos(theta), and each of alpha' and beta' at most all of it, over V
+    theta    a has the error x g. alpha' has at most all of it, over V; beta' has the part sin(phi) along the
+             second axis, and sin(beta) of the rest
     """
     dt, H, C = mon.h, mon.initial.H, mon.initial.C
     V = speed(y)
@@ -333,14 +334,16 @@ def fill_climb_effects(mon, y):
 
     d: the vertical unit vector downwards; vertical: `in_plane` of it; lift = dt V cos(beta) |vertical|.
 
-    V        climb is the true one, the predicted over 1 + x: they differ by x / (1 + x) of the latter
-    alpha    in altitude' (cos(alpha), sin(alpha)), times V cos(beta), is turned along
+    V        climb is the true change of the altitude, which is the predicted one over 1 + x: they differ by
+             x times the true one
+    alpha    altitude' contains V cos(beta) (cos(alpha), sin(alpha)), which is turned, along
              (sin(theta), -cos(phi) cos(theta)): altitude' = V cos(beta) |vertical| sin(gamma - alpha) + ...,
              where tan(gamma) = tan(theta) / cos(phi). The sines of reading and truth differ by
              x cos(mean of gamma - alpha)
-    beta     in altitude' (cos(beta), -sin(beta)), times V, is turned
-    phi      in altitude' the vertical's part cos(theta) is turned, against `share_across`
-    theta    in altitude' the vertical is turned, against v
+    beta     altitude' contains V (cos(beta), -sin(beta)), which is turned
+    phi      altitude' contains the vertical's part cos(theta), which is turned; the flow is along it by
+             `share_across`
+    theta    altitude' contains the vertical, which is turned against v
     """
     initial = mon.initial
     d = down(y)

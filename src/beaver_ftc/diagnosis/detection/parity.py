@@ -83,7 +83,7 @@ from beaver_ftc.diagnosis.detection.rows import (
 )
 from beaver_ftc.diagnosis.detection.tones import tones_dtype, update_tones, within_limits
 from beaver_ftc.diagnosis.detection.whitening import add_turn_to_drift
-from beaver_ftc.diagnosis.gusts import project_gust, view_drift
+from beaver_ftc.diagnosis.gust_drift import project_gust, view_drift
 from beaver_ftc.diagnosis.state import SIDE_FORCE
 
 PEAK_MEMORY_RATIO = 5.0  # time constant of `peak` over the one with which evidence is forgotten

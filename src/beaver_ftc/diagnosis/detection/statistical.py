@@ -53,11 +53,11 @@ from beaver_ftc.diagnosis.detection.rows import (
 )
 from beaver_ftc.diagnosis.detection.tones import TONE_RECORD
 from beaver_ftc.diagnosis.detection.whitening import D0, add_turn_to_drift, whiten_calm, whiten_step
+from beaver_ftc.diagnosis.gust_drift import unmeasured_drift
 from beaver_ftc.diagnosis.gusts import (
     GUST_RECORD,
     begin_gust_sums,
     fill_gust_effect,
-    unmeasured_drift,
     update_gust,
 )
 from beaver_ftc.diagnosis.state import DAMAGE_EXCLUDES, LOSS

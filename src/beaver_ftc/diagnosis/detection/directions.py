@@ -1,7 +1,7 @@
 """Projections on a direction, and the parity direction of each isolation estimator.
 
 m (3,)      direction of length 1 in roll, pitch and yaw; other files project on directions of other sizes
-v           vector, or size: bounds of the components of a vector
+v           vector, or a `size`, that is, bounds on the components of a vector
 G (3, n)    effect of each surface, rad/s2 per rad
 """
 
@@ -21,7 +21,7 @@ def project(m, v, size):
 
 @kernel
 def along(v, m, i, size):
-    """v_i of a vector v (3,), or, if i = 3, its part along a direction m (3,): see `project`."""
+    """Component i of a vector, or size, v (3,); for i = 3 its projection on a direction m (3,)."""
     return v[i] if i < 3 else project(m, v, size)
 
 

@@ -76,10 +76,16 @@ class ParityDirection(NamedTuple):
 
 
 def list_directions(aircraft: Aircraft, with_forces: bool = False) -> Iterator[ParityDirection]:
-    """The parity directions of an aircraft: each axis, and in roll and yaw across each surface's column.
+    """The parity directions of an aircraft:
 
-    With accelerometers also, in the plane of a rate and its force, across the column of each surface that
-    moves both and across that of the vane; and the force at the flow angle from inertial motion.
+        each axis by itself
+        in the plane of roll and yaw    across the column of each lateral surface
+
+    and with accelerometers, for each force that separates surfaces:
+
+        in the plane of a rate and      across the column of each surface that moves both, and across that of
+        its force                       an error of the vane
+        the force by itself             at the flow angle from inertial motion
     """
     pitch = [s for s, axis in enumerate(aircraft.dominant_axis) if axis == PITCH]
     lateral = [s for s, axis in enumerate(aircraft.dominant_axis) if axis != PITCH]
@@ -105,12 +111,13 @@ def list_directions(aircraft: Aircraft, with_forces: bool = False) -> Iterator[P
 def required_size(aircraft: Aircraft) -> StatisticalSize:
     """The capacities that the records of an aircraft need.
 
-    Regressors of a block of rates: the readings and the terms of its moments. A view has in addition the
-    terms of a force, the MAX_FORCE_REGRESSORS - MAX_TERMS_OF_ONE further constants of a force (forces.py),
-    and 2: the drift of the flow angle from inertial motion, and the leak.
-    Hypotheses of a block of rates: 3 for each surface (loss, growing loss, end of a loss), and 2: a step on
-    roll and on yaw, or in pitch a step and a moment in alpha^3. A view has the losses that it tests and 1
-    step.
+        regressors    block of rates    readings + terms of its moments
+                      view              the same + terms of a force + further constants of a force (forces.py:
+                                        MAX_FORCE_REGRESSORS - MAX_TERMS_OF_ONE) + 2: the drift of the flow
+                                        angle from inertial motion, and the leak
+        hypotheses    block of rates    3 for each surface (loss, growing loss, end of a loss) + 2: a step on
+                                        roll and on yaw, or in pitch a step and a moment in alpha^3
+                      view              losses that it tests + 1 step
     """
     directions = list(list_directions(aircraft, aircraft.forces_separate_surfaces))
     n_rate = N_INPUT_READINGS + _largest_block([moment_axis(term) for term in aircraft.moments])
@@ -135,7 +142,8 @@ def _largest_block(axes: list[int]) -> int:
 
 
 def configure_parity_views(stat: np.void, aircraft: Aircraft) -> None:
-    """Fill the views of a statistical record whose rows, blocks and forces are already set up."""
+    """Fill the views of a statistical record, whose rows, blocks, forces and gust estimates are already set
+    up."""
     forces = stat["forces"]
     gusty = bool(stat["gust"]["output"]["gusty"])
     # Rates subtract the gust estimate of the vanes only if both forces are used and separate surfaces

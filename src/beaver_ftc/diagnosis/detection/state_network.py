@@ -14,8 +14,8 @@ from beaver_ftc.design.table import ALPHA, BETA
 from beaver_ftc.diagnosis.detection.fdae import fill_gaussians, train
 from beaver_ftc.diagnosis.state import PITCH
 
-# Centres of the network's basis functions on each axis of the aircraft: alpha (pitch) or beta, rad; the rate
-# of the axis, rad/s; the deflection of the surface that leads it, as a share of its travel.
+# Centres of the network's basis functions on each axis of the aircraft: of alpha (pitch) or beta, rad; of the
+# rate of the axis, rad/s; of the deflection of the surface that leads it, as a share of its travel.
 ALPHA_CENTRES_RAD, BETA_CENTRES_RAD = np.linspace(-0.1, 0.5, 9), np.linspace(-0.4, 0.4, 9)
 RATE_CENTRES_RAD_S, TRAVEL_SHARE_CENTRES = np.linspace(-0.3, 0.3, 3), np.linspace(0.0, 1.0, 3)
 N_CENTRES = (len(ALPHA_CENTRES_RAD), len(RATE_CENTRES_RAD_S), len(TRAVEL_SHARE_CENTRES))
@@ -31,9 +31,8 @@ STATE_NETWORK_RECORD = record(
 
 
 def configure_network(net: np.void, gain: float, w_max: float, travel: np.ndarray) -> None:
-    """Fill the network's record; travel (2, 3) rad: of the surfaces that lead roll, pitch and yaw.
-
-    gain: Gamma, 1/s2.
+    """Fill the network's record. gain: Gamma, 1/s2; w_max rad/s2: largest size of a weight; travel (2, 3)
+    rad: lower and upper stop of the surfaces that lead roll, pitch and yaw.
     """
     cfg = net["config"]
     cfg["gain"], cfg["w_max"] = gain, w_max

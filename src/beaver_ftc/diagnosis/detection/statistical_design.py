@@ -121,7 +121,7 @@ def derive_alarm_level(false_alarms_per_h: float, rate_hz: float, n_tests: int) 
 def configure_statistics(fdi: np.void, declared: Declared, model: np.void, trim: TrimState) -> None:
     """Fill the statistical part of a diagnosis record; trim: x (3,), y and u (surfaces,) in trim.
 
-    The order of the calls is fixed, because a step reads what earlier ones have filled:
+    The order of the calls is fixed, because a step reads fields that earlier steps have filled:
 
         step                      reads                              filled by
         configure_gust_speed      test.alarm_level                   _configure_levels
@@ -260,7 +260,8 @@ def _configure_blocks(stat: np.void, declared: Declared, rate: float, dt_s: floa
 
 
 def eta_rate(settings: Statistical, aircraft: Aircraft, dt_s: float) -> float:
-    """Largest change of a bounded uncertainty within a frame, over its bound.
+    """Largest change of a bounded uncertainty within a frame of dt_s, over its bound: MAX_ETA_RATE if the
+    model has an error, else its frequency times dt_s.
 
     The error of an aircraft's own terms changes with its surfaces, which a law may move fully within a frame:
     from one end of the bound to the other. If the error is mapped, its rate of change is worked out in flight
@@ -281,7 +282,8 @@ def _configure_noise(
         Q0 = sum_x (F_x sigma_x)^2      Q = Q0 + sum_y (F_y sigma_y)^2, in trim; later as of
         `rows.add_constants`
 
-    F_x, F_y: slopes of f + G u with rates and air data; sigma: noise of the readings, gyros first.
+    F_x, F_y: slopes of f + G u with rates x and air data y; sigma: noise of the readings, gyros first. Also
+    fill G_trim, the magnitude of G in trim.
     """
     sigma = declared.sensors.each("random")
     noise = stat["noise"]

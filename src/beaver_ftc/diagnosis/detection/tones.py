@@ -187,7 +187,9 @@ def max_tone_mean(w: np.ndarray, rate: float) -> np.ndarray:
 
 
 def configure_tones(c: np.void, false_alarm: float, V: float, rate: float, dt: float) -> None:
-    """Fill the configuration that all views share.
+    """Fill the configuration that all views share (TONE_RECORD).
+
+        alarm_level = sqrt(-2 ln false_alarm)      rho = exp((i w - 1 / T) stride dt)
 
     false_alarm: probability of a false alarm granted to one test in one frame. V: airspeed in trim, m/s.
     rate: largest rate of change of a bounded uncertainty, bounds per second. dt s a frame.

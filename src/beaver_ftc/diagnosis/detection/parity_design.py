@@ -111,13 +111,13 @@ def list_directions(aircraft: Aircraft, with_forces: bool = False) -> Iterator[P
 def required_size(aircraft: Aircraft) -> StatisticalSize:
     """The capacities that the records of an aircraft need.
 
-        regressors    block of rates    readings + terms of its moments
-                      view              the same + terms of a force + further constants of a force (forces.py:
-                                        MAX_FORCE_REGRESSORS - MAX_TERMS_OF_ONE) + 2: the drift of the flow
-                                        angle from inertial motion, and the leak
-        hypotheses    block of rates    3 for each surface (loss, growing loss, end of a loss) + 2: a step on
-                                        roll and on yaw, or in pitch a step and a moment in alpha^3
-                      view              losses that it tests + 1 step
+    regressors    block of rates    readings + terms of its moments
+                  view              the same + terms of a force + further constants of a force (forces.py:
+                                    MAX_FORCE_REGRESSORS - MAX_TERMS_OF_ONE) + 2: the drift of the flow
+                                    angle from inertial motion, and the leak
+    hypotheses    block of rates    3 for each surface (loss, growing loss, end of a loss) + 2: a step on
+                                    roll and on yaw, or in pitch a step and a moment in alpha^3
+                  view              losses that it tests + 1 step
     """
     directions = list(list_directions(aircraft, aircraft.forces_separate_surfaces))
     n_rate = N_INPUT_READINGS + _largest_block([moment_axis(term) for term in aircraft.moments])

@@ -72,7 +72,9 @@ def add_gust_noise(
 def configure_gust_speed(gust: np.void, declared: Declared, level: float, V: float) -> None:
     """Fill the decay rate a of the gust velocity, and the error variance of the speed; V m/s: in trim.
 
-        a^3 = 2 b^2 V / (L sigma^2)      var_V = sigma^2 a / (a + V / L) + (b / a)^2 + errors of the airspeed
+        a^3 = 2 b^2 V / (L sigma^2)      var_V = sigma^2 a / (a + V / L) + (b / a)^2 + noise^2 + e_V^2
+
+    noise, e_V m/s: of the airspeed's reading, and its constant error.
 
     level: of the alarm, standard deviations. The sum v_g decays at the rate a, 1/s, so an error b of the
     acceleration, m/s2, gives it an error b / a. A gust returns to zero at the rate V / L, L m its length, so
@@ -84,7 +86,7 @@ def configure_gust_speed(gust: np.void, declared: Declared, level: float, V: flo
     if not (out["gusty"] and out["measured"]):
         return
     rate = V / SCALE_M
-    of_V = errors["V"]
+    airspeed = errors["V"]
     drag = GRAVITY_MPS2 * MAX_DRAG_OVER_WEIGHT
     b = 2.0 * EARTH_RATE_RAD_S * V + MAX_PATH_SLOPE_RAD * EARTH_M_S2  # Coriolis; change of gravity with place
     b += GRAVITY_MPS2 * (errors["phi"].steady + errors["theta"].steady)
@@ -93,7 +95,8 @@ def configure_gust_speed(gust: np.void, declared: Declared, level: float, V: flo
     else:
         b += drag * (declared.coefficients.largest + MASS_TOLERANCE)
     a = (2.0 * b**2 * rate / sigma**2) ** (1.0 / 3.0)
-    var_V = sigma**2 * a / (a + rate) + (b / a) ** 2 + of_V.random**2 + (of_V.steady + of_V.slope * V) ** 2
+    e_V = airspeed.steady + airspeed.slope * V
+    var_V = sigma**2 * a / (a + rate) + (b / a) ** 2 + airspeed.random**2 + e_V**2
     fill(
         gust["config"], var_v=sigma**2, v_max=MAX_GUST_STDS * sigma, a_v=a, var_V=var_V,
         speed_error_share=speed_error_share(level),

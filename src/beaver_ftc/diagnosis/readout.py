@@ -284,9 +284,9 @@ class DiagnosisReadout:
     def declared_bounds(self) -> DeclaredBounds:
         """The declared uncertainty."""
         errors = self._fdi["bound"]["declared_errors"]
-        of_gyros = (errors[name][:3] * bool(errors["given"]) for name in ("e0", "steady", "e1"))
+        gyro_errors = (errors[name][:3] * bool(errors["given"]) for name in ("e0", "steady", "e1"))
         names = "eta_bar n_gyro inertia_coupling_error_share const earth_rate_rad_s"
-        return _read(DeclaredBounds, self._fdi["bound"], names, *of_gyros)
+        return _read(DeclaredBounds, self._fdi["bound"], names, *gyro_errors)
 
     @cached_property
     def gust(self) -> GustReadout:

@@ -150,16 +150,16 @@ def compare_attitude(att, blocks, eta, x, dt, detected):
     after an alarm of the rates, `detected`, or if a turn is beyond its level; else they are 0 and -1.
     """
     pitch, lateral = blocks[PITCH_BLOCK], blocks[LATERAL_BLOCK]
-    of_axes = lateral, pitch, lateral
+    block_of_axis = lateral, pitch, lateral
     sum_turns(att, x, dt)
     att.xi[:] = att.s[:, 1]
-    for i, blk in enumerate(of_axes):
+    for i, blk in enumerate(block_of_axis):
         advance_axis(att, i, blk, BLOCK_ROWS[i], eta[i], dt, detected)
     att.score, att.gyro = 0.0, -1
     worst = np.argmax(att.turn_score)
     if detected or att.turn_score[worst] > 1.0:
         att.score = max(largest_correlation(att, pitch, 1), largest_correlation(att, lateral, 0))
-        for i, blk in enumerate(of_axes):
+        for i, blk in enumerate(block_of_axis):
             att.score = max(att.score, largest_sum(att, blk, i))
         find_gyro(att, worst)
 

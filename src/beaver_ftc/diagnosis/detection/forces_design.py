@@ -173,9 +173,9 @@ def _configure_columns(
         tol.append(acc.steady)
     tol += [MASS_TOLERANCE + acc.slope, drift]
     f["n_Z"], rows["tol"][first : first + len(tol)] = len(tol) - 1, tol
-    of_vane = rows["G"][MAX_SURFACES + i]
-    of_vane[[ROLL, force.axis, SIDE_FORCE + i]] = f["vane_roll"], *f["vane"]
-    rows["e_G"][MAX_SURFACES + i] = VANE_TOLERANCE * np.abs(of_vane)
+    vane_effect = rows["G"][MAX_SURFACES + i]
+    vane_effect[[ROLL, force.axis, SIDE_FORCE + i]] = f["vane_roll"], *f["vane"]
+    rows["e_G"][MAX_SURFACES + i] = VANE_TOLERANCE * np.abs(vane_effect)
 
 
 def _force_coefficient(declared: Declared, name: str, state: TrimState) -> float:

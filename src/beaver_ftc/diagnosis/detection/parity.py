@@ -207,13 +207,13 @@ def project_views(views, noise, rows, forces, gust, vaned, vaneless, V):
         view.used = not view.by_force or (forces.in_use and forces.n_seen == MIN_UPDATES)
         if not view.used:
             continue
-        of_view = gust if b.source == RAW else vaned
-        view.leak = turn_view(view, rows, of_view) if view.nulled != AXIS_VIEW else 0.0
+        air = gust if b.source == RAW else vaned
+        view.leak = turn_view(view, rows, air) if view.nulled != AXIS_VIEW else 0.0
         project_rows(b, rows)
         if view.nulled != AXIS_VIEW and b.n_Z > 0:
             fill_leak(b, rows, view.leak, view.col)
-        subtracted = vaneless if b.source >= VANELESS and forces.in_use else of_view
-        fill_view_drift(view, noise.q, of_view, subtracted, forces, V)
+        subtracted = vaneless if b.source >= VANELESS and forces.in_use else air
+        fill_view_drift(view, noise.q, air, subtracted, forces, V)
 
 
 @kernel

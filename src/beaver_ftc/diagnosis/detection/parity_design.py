@@ -194,8 +194,8 @@ def _configure_view(view: np.void, d: ParityDirection, gusty: bool, vaned: bool)
 
 def _configure_filter(b: np.void, d: ParityDirection, rates: np.void) -> None:
     """Fill direction and filter of a view's block from the block of the rates that the view combines."""
-    same = {name: rates[name] for name in ("alarm_level", "noise_share", "eta_rate")}
-    fill(b, n=1, a=1.0, Q_scale=1.0, any_position=1, **same)
+    rate_fields = {name: rates[name] for name in ("alarm_level", "noise_share", "eta_rate")}
+    fill(b, n=1, a=1.0, Q_scale=1.0, any_position=1, **rate_fields)
     b["m"][0, d.rows], b["P_xx"][0, 0] = 1.0, rates["R_y"].max()
     b["P_dd"][0, 0] = likelihood.DRIFT_PRIOR_RAD_S2**2
 

@@ -134,14 +134,14 @@ def configure_rows(stat: np.void, errors: SensorErrors, tol: np.ndarray, err: np
     rows["R"][:3] = [max(errors[name].random, MIN_GYRO_STD_RAD_S) ** 2 for name in AXES]
     rows["tol"][:n] = tol
     rows["first"] = n + N_INPUT_READINGS + np.array([0, MAX_FORCE_REGRESSORS + 1])
-    of_readings = rows["tol"][n : n + N_INPUT_READINGS]
+    reading_tol = rows["tol"][n : n + N_INPUT_READINGS]
     sigma = noise["sigma"]
     for name, j in _READING_OF.items():
-        of_readings[j], sigma[j] = errors[name].steady, errors[name].random
+        reading_tol[j], sigma[j] = errors[name].steady, errors[name].random
     # kw0 bounds the whole error of the power, so the noise is that over the standard deviations in a bound.
-    of_readings[_KW_READING] = err["kw0"]
+    reading_tol[_KW_READING] = err["kw0"]
     sigma[_KW_READING] = err["kw0"] / NOISE_LIMIT_SIGMA
-    noise["noisy"] = of_readings.any() or sigma.any()
+    noise["noisy"] = reading_tol.any() or sigma.any()
     rows["n"] = n + noise["noisy"] * N_INPUT_READINGS if noise["noisy"] or tol.any() else 0
 
 
@@ -234,12 +234,12 @@ def begin_rows(w, noise, rows, bound, model, meas, u):
 
 
 @kernel
-def finish_rows(rows, noise, forces, gust, of_views, vaneless, bound, means, nu, per_cubed):
+def finish_rows(rows, noise, forces, gust, vaned, vaneless, bound, means, nu, per_cubed):
     """Fill the rows of the rates for the elapsed frame; nu (3,) rad/s2: their innovation.
 
         rows.nu[source] = nu - acc_mean of the gust estimate that the source subtracts, RAW: none
 
-    gust, of_views, vaneless: the estimates that RATES, VANED and VANELESS subtract. means: of the prediction;
+    gust, vaned, vaneless: the estimates that RATES, VANED and VANELESS subtract. means: of the prediction;
     G and Gu of surfaces are with the effects of the frame before (see `predict_force`). per_cubed: see
     ROWS_RECORD.
     """
@@ -247,7 +247,7 @@ def finish_rows(rows, noise, forces, gust, of_views, vaneless, bound, means, nu,
     for i in range(3):
         rows.nu[RAW, i] = nu[i]
         rows.nu[RATES, i] = nu[i] - gust.output.acc_mean[i]
-        rows.nu[VANED, i] = nu[i] - (of_views.output.acc_mean[i] if forces.in_use else 0.0)
+        rows.nu[VANED, i] = nu[i] - (vaned.output.acc_mean[i] if forces.in_use else 0.0)
         rows.nu[VANELESS, i] = nu[i] - vaneless.output.acc_mean[i]
         rows.std[RAW, i] = rows.std[VANED, i] = np.sqrt(noise.Q[i])
         # The deviation of a sum is at most the sum of the deviations, for any correlation of the noises.

@@ -327,8 +327,8 @@ def bound_flow(mon, y, w_max, e_w):
     e_a = bound_acceleration(mon, w_max, e_w)
     a = a_size[0] + e_a
     growth = 1.0 + h * (2.0 * a_size[0] / V + w_max)
-    low = max(lowest(mon, y, ALTITUDE), LEAST_HEIGHT_M)
-    gust = np.sqrt(max(y[I_AIRSPEED] / mon.max_airspeed_mps, 1.0) * max(mon.low_m / low, 1.0))
+    height = max(lowest(mon, y, ALTITUDE), LEAST_HEIGHT_M)
+    gust = np.sqrt(max(y[I_AIRSPEED] / mon.max_airspeed_mps, 1.0) * max(mon.low_m / height, 1.0))
     angle = growth * (sec**2 * ((e_a + a * (vane + e_V / V)) / V + w_max * vane) + sec * e_w)
     mon.per_s[SPEED_TEST] = e_a + growth * a * vane + h * (a / V) ** 2 * e_V
     mon.gust[SPEED_TEST] = gust
@@ -355,13 +355,13 @@ def bound_density(mon, y):
     climb = past[I_AIRSPEED] + mon.e_past[I_AIRSPEED] + mon.wind_max + mon.gust_max
     per_s = climb / DENSITY_SCALE_HEIGHT_M
     per_sample = 0.0
-    for i, power, least in ((I_QDYN, 1.0, MIN_QDYN_PA), (I_AIRSPEED, 2.0, MIN_AIRSPEED_MPS)):
+    for i, power, floor in ((I_QDYN, 1.0, MIN_QDYN_PA), (I_AIRSPEED, 2.0, MIN_AIRSPEED_MPS)):
         e = mon.const[i]
-        y1 = max(y[i], least)
-        y0 = max(past[i], least)
+        y1 = max(y[i], floor)
+        y0 = max(past[i], floor)
         e_log = e * abs(1.0 / y1 - 1.0 / y0) / max(1.0 - e / min(y1, y0), MIN_SHARE_LEFT)
         per_s += power * e_log / mon.h
-        per_sample += power * mon.n[i] / max(y[i] - mon.e[i], least)
+        per_sample += power * mon.n[i] / max(y[i] - mon.e[i], floor)
     mon.per_s[DENSITY_TEST], mon.per_sample[DENSITY_TEST] = per_s, per_sample
 
 

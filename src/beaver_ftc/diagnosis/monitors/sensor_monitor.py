@@ -18,7 +18,8 @@ the laws, until the end of the flight. Accelerometers are not replaced: the diag
 broken (`measured.inertial`).
 
 Letters: redundancy.py and initial_errors.py; y (N_SENSORS,) readings, SI; mon: record of the monitor; o: its
-output; found: the conclusion about surfaces; bank: the detection filters; pred: the prediction of the model.
+output; verdict: the conclusion about surfaces; bank: the detection filters; pred: the prediction of the
+model.
 """
 
 import numpy as np
@@ -92,7 +93,7 @@ def expect_pressure(mon, pressure):
 
 
 @kernel
-def check_sensors(mon, pred, measured, found, bank, bound, dt, t):
+def check_sensors(mon, pred, measured, verdict, bank, bound, dt, t):
     """Test the sensors at t s, and replace in `measured` the readings of broken ones. One call is one sample;
     a frame has `substeps` samples.
 
@@ -116,7 +117,7 @@ def check_sensors(mon, pred, measured, found, bank, bound, dt, t):
             advance_stage(mon)
             if mon.config.noisy:
                 exclude_gyros(mon)
-        isolate_sensor(mon, measured, found, bank, bound, dt, t)
+        isolate_sensor(mon, measured, verdict, bank, bound, dt, t)
         replace_readings(mon, pred, measured)
         store_sample(mon, y, measured.force)
     mon.substep = (mon.substep + 1) % mon.config.substeps
@@ -132,7 +133,7 @@ def start_monitor(mon, y, force, t):
 
 
 @kernel
-def isolate_sensor(mon, measured, found, bank, bound, dt, t):
+def isolate_sensor(mon, measured, verdict, bank, bound, dt, t):
     """Raise the alarm, and isolate the sensor once it is the only suspect.
 
     A missing reading isolates its sensor. The test with the largest ratio beyond 1 raises the alarm. Each
@@ -145,11 +146,11 @@ def isolate_sensor(mon, measured, found, bank, bound, dt, t):
         o.worst_test_index, o.top_ratio = worst, mon.ratio[worst]
     for i in range(N_SENSORS):
         if measured.missing[i] and o.isolated_sensor == NO_SENSOR:
-            mark_isolated(mon, found, i, t)
+            mark_isolated(mon, verdict, i, t)
     if o.isolated_sensor != NO_SENSOR:
         return
     if o.top_ratio > 1.0 and not o.alarmed:
-        raise_alarm(mon, found, t)
+        raise_alarm(mon, verdict, t)
         o.alarm_test = o.worst_test_index
         mon.initial.E_alarm[:] = mon.initial.E
     if o.alarmed:
@@ -161,11 +162,11 @@ def isolate_sensor(mon, measured, found, bank, bound, dt, t):
             clear_sensors(mon, measured.signal)
         find_suspects(mon)
         if o.suspect.sum() == 1:
-            mark_isolated(mon, found, np.argmax(o.suspect), t)
+            mark_isolated(mon, verdict, np.argmax(o.suspect), t)
 
 
 @kernel
-def raise_alarm(mon, found, t):
+def raise_alarm(mon, verdict, t):
     """Raise the alarm of the sensors at t s, if it is not raised.
 
     A surface that was detected more than MIN_LEAD_S before was detected with sound sensors, and stays
@@ -175,30 +176,30 @@ def raise_alarm(mon, found, t):
     if o.alarmed:
         return
     o.alarmed, o.alarmed_at_s = 1, t
-    if found.detected:
-        o.keeps_surface = found.detected_at_s < t - MIN_LEAD_S
+    if verdict.detected:
+        o.keeps_surface = verdict.detected_at_s < t - MIN_LEAD_S
         if not o.keeps_surface:  # the rates have shown the same fault first
-            o.alarmed_at_s = found.detected_at_s
+            o.alarmed_at_s = verdict.detected_at_s
 
 
 @kernel
-def mark_isolated(mon, found, i, t):
+def mark_isolated(mon, verdict, i, t):
     """Isolate sensor i at t s, and raise the alarm if it is not raised."""
-    raise_alarm(mon, found, t)
+    raise_alarm(mon, verdict, t)
     mon.output.isolated_sensor = i
     mon.output.isolated_at_s = t
     mon.output.is_reading_unused[i] = 1
 
 
 @kernel
-def name_gyro(mon, found, i, t):
+def name_gyro(mon, verdict, i, t):
     """Isolate gyro i at t s, which attitude.py has found. The conclusion about surfaces is void, unless a
     surface has been isolated: the alarm of the surfaces was that of the gyro."""
     o = mon.output
-    mark_isolated(mon, found, i, t)
-    if o.keeps_surface and found.isolated_estimator < 0:
+    mark_isolated(mon, verdict, i, t)
+    if o.keeps_surface and verdict.isolated_estimator < 0:
         o.keeps_surface = 0
-        o.alarmed_at_s = found.detected_at_s
+        o.alarmed_at_s = verdict.detected_at_s
 
 
 @kernel

@@ -140,9 +140,9 @@ def suspect_duplicate(mon, d):
 
 
 @kernel
-def alone(shown, i):
-    """Whether none of these tests but test i shows an error; shown (tests,)."""
-    return shown.sum() == shown[i]
+def alone(exceeded, i):
+    """Whether none of these tests but test i shows an error; exceeded (tests,)."""
+    return exceeded.sum() == exceeded[i]
 
 
 @kernel
@@ -173,10 +173,10 @@ def suspect_attitude(mon):
         explains = explains_turns(mon, i)
         k = PHI + i
         unshared = alone(angles, i) if i == 2 else alone(refuted[i], i)
-        only = unshared and (explains or angles[i] == 1)
+        is_sole = unshared and (explains or angles[i] == 1)
         axis = worst if ratio[worst] > ratio[i] else i
         early = 0 < mon.n_same[k] < mon.config.n_frozen[k] < N_FROZEN_NEVER
-        suspect[k] = (only and mon.gyro[axis].verdict != GYRO_CONFIRMED) or (explains and early)
+        suspect[k] = (is_sole and mon.gyro[axis].verdict != GYRO_CONFIRMED) or (explains and early)
 
 
 @kernel
@@ -194,7 +194,7 @@ def explains_turns(mon, i):
     `gyro_or_attitude.filter_beyond`; E, H: bound on an error of the angle from the start, and its effect
     (initial_errors.py), 0 for psi.
     """
-    own = ANGLE_TEST + i
+    own_test = ANGLE_TEST + i
     h = min(H_PHI + i, N_INITIAL - 1)  # psi has no hypothesis: any h, as initial is 0
     initial = mon.initial.E_alarm[h] if i < 2 else 0.0
     tilt = mon.e[PHI] + mon.e[THETA]
@@ -202,9 +202,9 @@ def explains_turns(mon, i):
         r = mon.r[j]
         c = abs(turn_share(mon.y_past, j, i)) + tilt
         for m in range(r.size):
-            B = mon.B[own, m]
+            B = mon.B[own_test, m]
             sound = mon.B[j, m] + initial * mon.initial.H_m[h, j, m]
-            now = abs(r[m]) > c * (abs(mon.r[own, m]) + B) + sound
+            now = abs(r[m]) > c * (abs(mon.r[own_test, m]) + B) + sound
             since = abs(mon.beyond[i, j, m]) > sound + mon.c_max[i, j] * B + tilt * mon.swing[i, m]
             if mon.exceeded[j] and now and since:
                 return False
@@ -273,9 +273,9 @@ def suspect_accelerometers(mon):
     plane = complex(dV.r_sum, V * db.r_sum) * unit(y[I_BETA])
     body = complex(plane.real, V * np.cos(y[I_BETA]) * da.r_sum) * unit(y[I_ALPHA])
     dv = abs(body.real), abs(plane.imag), abs(body.imag)
-    least = MIN_AXIS_SHARE * max(dv) - dV.B_sum - V * (da.B_sum + db.B_sum)
+    limit = MIN_AXIS_SHARE * max(dv) - dV.B_sum - V * (da.B_sum + db.B_sum)
     for i in FORCES:
-        mon.output.suspect[i] = frozen == i or (frozen < 0 and dv[i - AX] >= least)
+        mon.output.suspect[i] = frozen == i or (frozen < 0 and dv[i - AX] >= limit)
 
 
 @kernel

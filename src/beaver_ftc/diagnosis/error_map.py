@@ -132,7 +132,7 @@ def share_used(emap, s, between, before, n):
         |p| <= (n |mean| + |before|) / (n - 1)
 
     All are shares of the travel. between: (low, high), rad, of the mean position over the instants; before:
-    share at the start of the frame, which still holds at the first instant.
+    share at the start of the frame, which may still hold at the first instant.
     """
     share = max(travel_share(emap, s, between[0]), travel_share(emap, s, between[1]))
     if n > 1:

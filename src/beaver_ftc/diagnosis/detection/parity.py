@@ -269,11 +269,14 @@ def view_score(view):
 def confirmed_score(view, views, cfg, forces):
     """The score of a view, limited by the views that confirm that it is not an error of a vane:
 
-        min(peak, P alarm_level / sqrt(2 margin))      P: the largest peak of the views that confirm
+        view                                       score
+        sees a force, and no forces are used       0
+        source not VANED, or no forces are used    `view_score`: no confirmation is needed
+        others                                     min(peak, P alarm_level / sqrt(2 margin))
 
-    A view of the rates alone from which no gust is subtracted needs no confirmation: no error of a vane
-    changes the rates alone. Peak scores are compared because the view and its confirmation may reach their
-    levels at different times. The confirming view must reach the level of the isolation, sqrt(2 margin).
+    P: the largest peak of the views that confirm; it must reach the level of the isolation, sqrt(2 margin).
+    Peaks are compared because a view and its confirmation may reach their levels at different times. No error
+    of a vane changes the rates alone, so a view of RAW rates needs no confirmation.
     """
     if view.by_force and not forces.in_use:
         return 0.0

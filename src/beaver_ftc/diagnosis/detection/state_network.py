@@ -39,7 +39,8 @@ def configure_network(net: np.void, gain: float, w_max: float, travel: np.ndarra
     for i in range(3):
         angles = ALPHA_CENTRES_RAD if i == PITCH else BETA_CENTRES_RAD
         deflections = travel[0, i] + TRAVEL_SHARE_CENTRES * (travel[1, i] - travel[0, i])
-        first, second = np.transpose([centres[:2] for centres in (angles, RATE_CENTRES_RAD_S, deflections)])
+        inputs = angles, RATE_CENTRES_RAD_S, deflections
+        first, second = np.transpose([centres[:2] for centres in inputs])
         cfg["c0"][i], cfg["dc"][i] = first, second - first
 
 

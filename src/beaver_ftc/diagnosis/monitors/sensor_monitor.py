@@ -239,7 +239,7 @@ def allows_isolation(mon, is_earlier, detected_at_s):
     a flow sensor stands still                    no: a surface that moves the aircraft moves its reading
     alarm in this frame (not `is_earlier`)        only if gyros are in doubt, because then the name waits;
                                                   a gyro's fault shows in the attitude one frame late
-    otherwise                                     yes
+    otherwise, or if no monitor is enabled        yes
     """
     if not mon.config.enabled:
         return True

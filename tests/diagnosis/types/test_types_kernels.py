@@ -9,7 +9,7 @@ from kernels import new_fdi, on, put_on
 from beaver_ftc.diagnosis import types
 from beaver_ftc.diagnosis.types import examination, registry, release
 from beaver_ftc.diagnosis.types.registry import N_TYPES, TYPES
-from beaver_ftc.diagnosis.types.table import commanded_surface
+from beaver_ftc.diagnosis.types.table import growing_bias, loss, oscillation, rate_limit
 from fault_kinds import (
     BIAS,
     CONSTANT_LOSS,
@@ -60,8 +60,8 @@ def judged(judge, fdi, surface, kind, *given):
 )  # fmt: skip
 def test_a_constant_loss_keeps_the_shares_that_explain_the_frame(low, high, command, expected):
     fdi, surface = new_surface(low=low, high=high, command=command)
-    judged(commanded_surface.loss_interval, fdi, surface, CONSTANT_LOSS, 5)
-    judged(commanded_surface.varying_loss_set, fdi, surface, VARYING_LOSS, 5)
+    judged(loss.consistent_interval, fdi, surface, CONSTANT_LOSS, 5)
+    judged(loss.varying_interval, fdi, surface, VARYING_LOSS, 5)
     assert (
         surface["sets"]["excluded"][CONSTANT_LOSS]
         == surface["sets"]["excluded"][VARYING_LOSS]
@@ -89,7 +89,7 @@ def test_a_growing_bias_keeps_its_sign_and_never_shrinks(offsets, excluded):
             offset - 0.01,
             offset + 0.01,
         )
-        judged(commanded_surface.update_growing, fdi, surface, GROWING_BIAS, 5)
+        judged(growing_bias.consistent_interval, fdi, surface, GROWING_BIAS, 5)
     assert surface["sets"]["excluded"][GROWING_BIAS] == excluded
 
 
@@ -105,14 +105,14 @@ def test_a_growing_bias_keeps_its_sign_and_never_shrinks(offsets, excluded):
 def test_a_growing_bias_is_as_fast_as_a_runaway_only_where_that_is_certain(places, ran):
     fdi, surface = new_surface(runaway=0.05 / DT)
     for place in places:
-        on(commanded_surface.widen_offset, fdi, surface, GROWING_BIAS, 5, place == "well")
+        on(growing_bias.see_frame, fdi, surface, GROWING_BIAS, 5, place == "well")
         if place not in (None, "well"):
             surface["judged"]["lo"], surface["judged"]["hi"] = (
                 place - 0.01,
                 min(place + 0.01, HIGH),
             )
             judged(
-                commanded_surface.update_growing,
+                growing_bias.consistent_interval,
                 fdi,
                 surface,
                 GROWING_BIAS,
@@ -132,7 +132,7 @@ def slow_run(places, commands=(0.0, 0.0), whole=1, frames=None, slowest_step=0.0
             place + 0.01,
         )
         judged(
-            commanded_surface.update_creep,
+            rate_limit.consistent_interval,
             fdi,
             surface,
             SLOW,
@@ -173,14 +173,13 @@ def swung(signs, half_frames=20):
     fdi, surface = new_surface()
     fdi["types"]["config"]["half_frames"] = half_frames
     for frame, sign in enumerate(signs):
-        fdi["types"]["frame_index"] = frame + 1
         surface["judged"]["lo"], surface["judged"]["hi"] = (
             0.1 * sign - 0.02,
             0.1 * sign + 0.02,
         )
-        on(commanded_surface.add_square, fdi, surface, OSCILLATORY, frame, False)
+        on(oscillation.see_frame, fdi, surface, OSCILLATORY, frame, False)
         judged(
-            commanded_surface.update_swing,
+            oscillation.consistent_interval,
             fdi,
             surface,
             OSCILLATORY,
@@ -196,7 +195,7 @@ def test_an_oscillation_is_counted_by_half_cycles():
     assert (swing["first_end"], swing["last_end"]) == (5, 15)
     assert registry.has_shown(OSCILLATORY, surface, OSCILLATORY)
     assert not registry.has_shown(OSCILLATORY, swung([1] * 5 + [-1] * 5 + [1])[1], OSCILLATORY)
-    assert commanded_surface.swing_frequency(fdi, 0, OSCILLATORY) == pytest.approx(2 * np.pi / (10 * DT))
+    assert oscillation.estimate_frequency(fdi, 0, OSCILLATORY) == pytest.approx(2 * np.pi / (10 * DT))
     # the first half-cycle is cut off and does not count: ten frames, each 0.1 rad off; its first frame is
     # summed before the half-cycle before it is seen to have ended
     assert swing["square_past"] == pytest.approx(10 * 0.01)

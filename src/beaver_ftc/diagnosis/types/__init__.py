@@ -304,6 +304,12 @@ def observe_error(srf, e, tol):
 
 
 @kernel
+def judged_error(srf):
+    """p - u of the surface in the judged frame, (lo, hi) rad."""
+    return srf.judged.lo - srf.judged.u, srf.judged.hi - srf.judged.u
+
+
+@kernel
 def last_error(srf):
     """p - u in the elapsed frame, rad, p in the middle of where it can have been."""
     return 0.5 * (srf.last.lo + srf.last.hi) - srf.last.u

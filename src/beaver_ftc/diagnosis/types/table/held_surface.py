@@ -41,18 +41,6 @@ def stuck_error(srf, h):
     return set_middle(srf, h) - srf.last.u
 
 
-STUCK = FaultType(
-    name="stuck", has_constant_parameter=True, sort_rank=2, holds_surface=True,
-    parameter_range=travel_range, deflection_range=stuck_range,
-    evidence_at_rest=REST_POSITION_IS_PARAMETER,
-    accommodation_mode=GIVE_UP, deflection_error=stuck_error, deflection_error_precedence=3,
-    deflection_relation=DeflectionRelation(
-        0.0, theta_is_share=False, theta_span=lambda low, high: (low, high)
-    ),
-    estimate_parameter=middle_estimate, estimate_parameter_interval=feasible_set,
-)  # fmt: skip
-
-
 def neutral_of(lo: float, hi: float) -> float:
     """Neutral, or the stop that is nearest to it, rad."""
     return min(max(0.0, lo), hi)
@@ -84,21 +72,6 @@ def upper_stop(fdi: np.void, s: int, h: int) -> float:
 def lower_stop(fdi: np.void, s: int, h: int) -> float:
     """Lower stop of surface s, rad, where a hardover downwards ends."""
     return float(fdi["types"]["surface"][s]["actuator"]["stop_lo"])
-
-
-FLOAT = FaultType(
-    name="float", has_constant_parameter=True, sort_rank=3, holds_surface=True,
-    deflection_range=float_range,
-    accommodation_mode=SUBTRACT_OFFSET, other_accommodation_modes=(GIVE_UP, SCALE_COMMAND),
-    deflection_error=float_error,
-    deflection_error_precedence=1,
-    deflection_relation=DeflectionRelation(
-        0.0,
-        theta_is_share=False,
-        theta_span=lambda low, high: (neutral_of(low, high),) * 2
-    ),
-    estimate_parameter=float_deflection,
-)  # fmt: skip
 
 
 @kernel
@@ -136,16 +109,40 @@ def down_range(c, srf, h, k):
     return act.stop_lo, max(act.stop_lo, hi)
 
 
-HARDOVER_UP = FaultType(
-    name="hardover", description="hardover up", has_constant_parameter=True, sort_rank=4, holds_surface=True,
-    deflection_range=up_range, stop_direction=1,
-    accommodation_mode=GIVE_UP, frames_test="runaway",
-    estimate_parameter=upper_stop,
+TYPES = (
+    FaultType(
+        name="stuck", has_constant_parameter=True, sort_rank=2, holds_surface=True,
+        parameter_range=travel_range, deflection_range=stuck_range,
+        evidence_at_rest=REST_POSITION_IS_PARAMETER,
+        accommodation_mode=GIVE_UP, deflection_error=stuck_error, deflection_error_precedence=3,
+        deflection_relation=DeflectionRelation(
+            0.0, theta_is_share=False, theta_span=lambda low, high: (low, high)
+        ),
+        estimate_parameter=middle_estimate, estimate_parameter_interval=feasible_set,
+    ),
+    FaultType(
+        name="float", has_constant_parameter=True, sort_rank=3, holds_surface=True,
+        deflection_range=float_range,
+        accommodation_mode=SUBTRACT_OFFSET, other_accommodation_modes=(GIVE_UP, SCALE_COMMAND),
+        deflection_error=float_error,
+        deflection_error_precedence=1,
+        deflection_relation=DeflectionRelation(
+            0.0,
+            theta_is_share=False,
+            theta_span=lambda low, high: (neutral_of(low, high),) * 2
+        ),
+        estimate_parameter=float_deflection,
+    ),
+    FaultType(
+        name="hardover", description="hardover up", has_constant_parameter=True, sort_rank=4, holds_surface=True,
+        deflection_range=up_range, stop_direction=1,
+        accommodation_mode=GIVE_UP, frames_test="runaway",
+        estimate_parameter=upper_stop,
+    ),
+    FaultType(
+        name="hardover", description="hardover down", has_constant_parameter=True, sort_rank=5,
+        holds_surface=True, deflection_range=down_range, stop_direction=-1,
+        accommodation_mode=GIVE_UP, frames_test="runaway",
+        estimate_parameter=lower_stop,
+    ),
 )  # fmt: skip
-HARDOVER_DOWN = FaultType(
-    name="hardover", description="hardover down", has_constant_parameter=True, sort_rank=5,
-    holds_surface=True, deflection_range=down_range, stop_direction=-1,
-    accommodation_mode=GIVE_UP, frames_test="runaway",
-    estimate_parameter=lower_stop,
-)  # fmt: skip
-TYPES = STUCK, FLOAT, HARDOVER_UP, HARDOVER_DOWN

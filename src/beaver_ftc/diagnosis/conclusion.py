@@ -21,6 +21,7 @@ from beaver_ftc.diagnosis.types import (
     SUBTRACT_OFFSET,
     WAIT_FOR_SURFACE,
     last_error,
+    modes,
     verdict,
 )
 
@@ -218,12 +219,12 @@ def assess_surface(out, types, layout, fies, s):
     possible = verdict.can_be_faulty(surf)
     mode = surf.accommodation.mode
     if mode == SCALE_COMMAND:
-        out.effectiveness[s] = verdict.remaining_effectiveness(types, layout, fies, s)
+        out.effectiveness[s] = modes.remaining_effectiveness(types, layout, fies, s)
     elif mode == GIVE_UP:
         out.effectiveness[s], out.at_once[s] = 0.0, 1
-        out.offset[s] = surf.last.u + verdict.deflection_error(surf, possible)
+        out.offset[s] = surf.last.u + modes.deflection_error(surf, possible)
     elif mode == SUBTRACT_OFFSET:
-        out.offset[s] = verdict.deflection_error(surf, possible)
+        out.offset[s] = modes.deflection_error(surf, possible)
     elif mode == WAIT_FOR_SURFACE:
         out.lag[s] = last_error(surf)
         out.lags = 1

@@ -37,7 +37,7 @@ from beaver_ftc.diagnosis.model_prediction import (
 from beaver_ftc.diagnosis.monitors import engine_monitor, sensor_monitor
 from beaver_ftc.diagnosis.schemes import record_isolated_surfaces
 from beaver_ftc.diagnosis.state import PITCH
-from beaver_ftc.diagnosis.types import verdict
+from beaver_ftc.diagnosis.types import modes
 from beaver_ftc.loop.accounts import account, add_effect, effect_of_faults, follow_guarantee
 from beaver_ftc.loop.log_row import record_row
 from beaver_ftc.plant import channels as ch
@@ -93,7 +93,7 @@ def monitor_sensors(frame):
 def reset_surface_diagnosis(fdi):
     """Discard what the diagnosis of the surfaces made of a broken sensor."""
     conclusion.withdraw_conclusion(fdi.verdict)
-    verdict.clear_modes(fdi.types.surface)
+    modes.clear_modes(fdi.types.surface)
     fdae.reset_network(fdi.fdae.network)
 
 

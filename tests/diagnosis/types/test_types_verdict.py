@@ -10,6 +10,7 @@ from beaver_ftc.diagnosis.types import (
     SCALE_COMMAND,
     SUBTRACT_OFFSET,
     WAIT_FOR_SURFACE,
+    modes,
     pairs,
     verdict,
 )
@@ -98,7 +99,7 @@ NOBODY_ELSE = {"aileron": None, "elevator": None, "flap": None}
 def test_what_kind_of_fault_it_may_be(kinds, fixed, one_type, sole_shown):
     _, surface = one(*kinds)
     same_name = verdict.SAME_NAME[sole_shown] if sole_shown >= 0 else -1
-    assert (verdict.choose_mode(surface) == GIVE_UP) == fixed
+    assert (modes.choose_mode(surface) == GIVE_UP) == fixed
     assert max(verdict.sole_type(surface, verdict.CONSTANT), -1) == one_type
     found = verdict.sole_shown_type(surface, verdict.ALL)
     assert (verdict.SAME_NAME[found] if found >= 0 else -1) == same_name
@@ -179,7 +180,7 @@ def test_a_type_is_named_once_it_is_the_only_one(kinds, evidence, half_cycles, f
     ],
 )  # fmt: skip
 def test_what_is_done_about_a_surface(kinds, accommodation_mode):
-    assert verdict.choose_mode(one(*kinds)[1]) == accommodation_mode
+    assert modes.choose_mode(one(*kinds)[1]) == accommodation_mode
 
 
 # Examining frames.

@@ -24,7 +24,7 @@ from beaver_ftc.diagnosis.state import (
     WORST_CASE_DETECTOR,
     YAW,
 )
-from beaver_ftc.diagnosis.types import examination, pairs, verdict
+from beaver_ftc.diagnosis.types import examination, modes, pairs, verdict
 
 
 @kernel
@@ -141,7 +141,7 @@ def decide_type(fdi, t, started):
         finding = pairs.decide_pairs(types, found, layout, t)
     else:
         finding = verdict.decide_single(types, found, layout, t)
-    conclusion.record_decision(found, finding, verdict.accommodate(types, layout))
+    conclusion.record_decision(found, finding, modes.accommodate(types, layout))
 
 
 @apart

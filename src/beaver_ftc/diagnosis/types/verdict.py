@@ -1,34 +1,34 @@
-"""From the types left to a verdict: surface, type, and what the law does; findings.py puts it in words.
+"""Which type of fault is on which surface: from the types left to the finding. modes.py then chooses what the
+law does, and findings.py puts the finding in words.
 
 No type is named here: the columns of the table (`FaultType`) say what distinguishes one from another. Kernels
 of one surface assume that it is at fault; `can_be_faulty` says whether it can be.
 
-types: of `fault_types_dtype`; past: of `conclusion_dtype`, of the frame before; kind: a type, TYPE_UNDECIDED
-or NO_TYPE; mode: of accommodation. A finding is a tuple of four: an estimator, NOT_ISOLATED or UNANTICIPATED;
-the instant of its isolation, s; the kind; the instant since which it is of this kind, s. In
-has_shown(h, srf, h) the first h selects the kernel of the type, and the second is its argument. Other
+    remains     the type is not excluded
+    sole        the only surface, or type, that remains
+    shown       the type need not show itself, or has done so (`has_shown`)
+    hidden      a surface at rest would not show the type
+    anomalous   a frame that more than the declared uncertainty must explain; counted in `evidence`
+
+    types       record of `fault_types_dtype`
+    past        record of `conclusion_dtype`, of the frame before
+    layout      record of `state.layout_dtype`
+    kind        a type, TYPE_UNDECIDED or NO_TYPE
+    mask        types, (N_TYPES,) bool
+    finding     four values: an estimator, NOT_ISOLATED or UNANTICIPATED; the time of its isolation, s; the
+                kind; the time since which the fault is of this kind, s
+
+In has_shown(h, srf, h) the first h selects the kernel of the type, and the second is its argument. Other
 symbols: types/__init__.py.
 """
 
-import numpy as np
-
 from beaver_ftc.compiled import kernel
-from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, PITCH_GROUP, UNANTICIPATED
-from beaver_ftc.diagnosis.types import (
-    GIVE_UP,
-    SCALE_COMMAND,
-    SUBTRACT_OFFSET,
-    WAIT_FOR_SURFACE,
-    last_error,
-    registry,
-    set_middle,
-)
+from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, UNANTICIPATED
+from beaver_ftc.diagnosis.types import SCALE_COMMAND
 from beaver_ftc.diagnosis.types.registry import (
     ALL,
     CAN_LOOK_LIKE,
     CONSTANT,
-    END_TYPE,
-    ERROR_TYPES,
     FOLLOWS_COMMAND,
     HIDDEN_AT_REST,
     MODE,
@@ -36,11 +36,9 @@ from beaver_ftc.diagnosis.types.registry import (
     N_TYPES,
     NAMED,
     SAME_NAME,
-    SERVES,
     SHOW_HALF_CYCLES,
     STOP_SIDE,
     VARYING_LIKE,
-    VARYING_OF_MODE,
     VARYING_QUIET,
     VARYING_SHOWN,
     WAIT_HALF_CYCLES,
@@ -49,23 +47,23 @@ from beaver_ftc.diagnosis.types.registry import (
 )
 
 NO_SURFACE, SEVERAL_SURFACES = -1, -2
-TYPE_UNDECIDED, NO_TYPE = -1, -2  # the type of a fault of which more than one type is left, or none
-# What decides whether a surface can be at fault: its estimator, or what is known of the other (pairs.py).
+TYPE_UNDECIDED, NO_TYPE = -1, -2  # more than one type remains, or none
+# `status.basis`: what decides whether a surface can be at fault: its estimator, or what pairs.py deduces from
+# the other surface of its plane.
 BY_ESTIMATOR, DEDUCED_FAULTY, DEDUCED_HEALTHY = range(3)
-MAX_SILENCE_S = 0.2  # a fault that has not shown for as long is taken for gone
-_TIME_TOLERANCE_S = 1e-9
 
 
 @kernel
 def record_exclusions(surfs, layout, est):
-    """Keep for every surface whether its estimator is excluded."""
+    """Record for every surface whether the estimator of its position is excluded."""
     for s, srf in enumerate(surfs):
         srf.not_at_position = est[layout.position[s]].excluded
 
 
 @kernel
 def can_be_faulty(srf):
-    """Whether anything on a surface can be the fault."""
+    """Whether a surface can be at fault: as pairs.py has deduced, or else if the estimator of its position is
+    not excluded."""
     if srf.status.basis != BY_ESTIMATOR:
         return srf.status.basis == DEDUCED_FAULTY
     return not srf.not_at_position
@@ -79,7 +77,7 @@ def type_remains(srf, h):
 
 @kernel
 def any_remains(srf, mask):
-    """Whether any type of a mask (N_TYPES,) is left."""
+    """Whether any type of a mask (N_TYPES,) remains."""
     # A loop: compiled code with np.any loads scipy.linalg, which takes longer than the flight.
     for h in range(N_TYPES):
         if mask[h] and type_remains(srf, h):
@@ -89,19 +87,19 @@ def any_remains(srf, mask):
 
 @kernel
 def constant_remains(srf):
-    """Whether a type with a constant parameter is left."""
+    """Whether a type with a constant parameter remains."""
     return any_remains(srf, CONSTANT)
 
 
 @kernel
 def name_remains(srf, named):
-    """Whether a type of this name is left; with TYPE_UNDECIDED, one of any name."""
+    """Whether a type of the name of type `named` remains; with TYPE_UNDECIDED, one of any name."""
     return any_remains(srf, NAMED[named])
 
 
 @kernel
 def explains_flight(srf):
-    """Whether some type explains the flight: it is left, and if it must show itself it has."""
+    """Whether some type explains the flight: it remains and is shown."""
     for h in range(N_TYPES):
         if type_remains(srf, h) and has_shown(h, srf, h):
             return True
@@ -110,7 +108,8 @@ def explains_flight(srf):
 
 @kernel
 def would_have_shown(c, srf):
-    """Whether each type that must show itself is excluded, or has had the time to, hidden by no stop."""
+    """Whether each type that must show itself is excluded, or has had its time to do so: SHOW_HALF_CYCLES
+    half-cycles of frames in which no stop could hide it (`n_unhidden`)."""
     for h in range(N_TYPES):
         if type_remains(srf, h) and srf.evidence.n_unhidden < SHOW_HALF_CYCLES[h] * c.half_frames:
             return False
@@ -119,8 +118,8 @@ def would_have_shown(c, srf):
 
 @kernel
 def sole_type(srf, mask):
-    """The one type of a mask that is left, NO_TYPE, or TYPE_UNDECIDED if there are several; of several of one
-    name, the first."""
+    """The sole type of a mask, NO_TYPE if none remains, or TYPE_UNDECIDED if types of several names remain;
+    of several of one name, the first."""
     kind = NO_TYPE
     for h in range(N_TYPES):
         if mask[h] and type_remains(srf, h):
@@ -132,15 +131,16 @@ def sole_type(srf, mask):
 
 @kernel
 def sole_shown_type(srf, mask):
-    """The one type of a mask that is left, if it has shown itself; else TYPE_UNDECIDED."""
+    """The sole type of a mask if it is shown, else TYPE_UNDECIDED."""
     kind = sole_type(srf, mask)
     return kind if kind >= 0 and has_shown(kind, srf, kind) else TYPE_UNDECIDED
 
 
 @kernel
 def may_be_hidden(c, srf):
-    """Whether what a constant explains may be a type that does not show in a surface at rest, such as a slow
-    surface that has come to where it is commanded: it has not stood off its command for long."""
+    """Whether the fault may be a hidden type although a constant type explains it. An example is a slow
+    surface that has reached its command. The surface has then been off its command for less than half a
+    cycle: n_anomalous - n_rest < half_frames."""
     return (
         constant_remains(srf)
         and srf.evidence.n_anomalous - srf.evidence.n_rest < c.half_frames
@@ -149,12 +149,14 @@ def may_be_hidden(c, srf):
 
 
 @kernel
-def can_be_another(srf, apparent, dependent):
-    """Whether what looks like the constant type `apparent`, or another left of its name, may be a varying
-    type that is left; unless `dependent`, one that does not follow the command.
+def can_be_another(srf, apparent, with_dependent):
+    """Whether what looks like the constant type `apparent` may be a varying type h: h remains, can look like
+    a constant type j that remains and has the name of `apparent`, and the motion does not rule h out.
+
+    with_dependent: whether types that depend on the command (`FOLLOWS_COMMAND`) count as well.
     """
     for h in range(N_CONSTANT, N_TYPES):
-        if apparent >= 0 and type_remains(srf, h) and (dependent or not FOLLOWS_COMMAND[h]):
+        if apparent >= 0 and type_remains(srf, h) and (with_dependent or not FOLLOWS_COMMAND[h]):
             for j in range(N_CONSTANT):
                 alike = SAME_NAME[j] == SAME_NAME[apparent] and CAN_LOOK_LIKE[h, j] and type_remains(srf, j)
                 if alike and not motion_rules_out(h, srf, h, STOP_SIDE[j]):
@@ -164,8 +166,8 @@ def can_be_another(srf, apparent, dependent):
 
 @kernel
 def sole_surface(surfs, constant):
-    """The one possible surface, with a type of constant parameter left if so asked; NO_SURFACE or
-    SEVERAL_SURFACES."""
+    """The sole surface that can be at fault, NO_SURFACE or SEVERAL_SURFACES; with `constant`, only surfaces
+    on which a constant type remains count."""
     sole = NO_SURFACE
     for s, srf in enumerate(surfs):
         if srf.status.may_be_sole and can_be_faulty(srf) and (constant_remains(srf) or not constant):
@@ -177,13 +179,17 @@ def sole_surface(surfs, constant):
 def find_surface(types, layout):
     """The surface the fault is on, NOT_ISOLATED or UNANTICIPATED.
 
-    1. No surface can be at fault: UNANTICIPATED.
-    2. One can: that surface. What acts on pitch alone shows no direction, so there a type must explain the
-       flight as well.
-    3. Several can. If elevator or flap moves in a certain way, it has the effect of a constant fault of the
-       other. So the one surface that a constant fault explains is isolated, once `others_dismissed`.
+        surfaces that can be at fault                               isolated
+        none                                                        UNANTICIPATED
+        one, not of pitch                                           that surface
+        one of pitch, on which a type explains the flight           that surface
+        several, a constant type remains on one, and the others     the one with the constant type
+        are dismissed (`others_dismissed`)
+        otherwise                                                   NOT_ISOLATED
 
-    In all other cases NOT_ISOLATED.
+    Surfaces of pitch act on pitch alone, so the direction of the acceleration does not distinguish them. If
+    elevator or flap moves in a certain way, it has the effect of a constant fault of the other: this is why
+    the constant type decides between several.
     """
     s = sole_surface(types.surface, False)
     if s == NO_SURFACE:
@@ -196,12 +202,15 @@ def find_surface(types, layout):
 
 @kernel
 def others_dismissed(types, sole):
-    """Whether every other surface than `sole` can only have a fault that depends on its command.
+    """Whether every surface other than `sole` can only have a fault that depends on its command, and there
+    have been enough anomalous frames to say so:
 
-    A type that must show itself is given the time to. If errors of the surfaces' effects are declared
-    (has_eG), a varying fault can hide in them, and every type of the others must have been excluded.
+        n_anomalous >= half_frames max(1, WAIT_HALF_CYCLES of the types that remain on the others)
+
+    A type that must show itself has had its time (`would_have_shown`). If errors of the surfaces' effects are
+    declared (has_eG), a varying fault can hide in them, and every type of the others must be excluded.
     """
-    c, n = types.config, 1
+    c, wait_half_cycles = types.config, 1
     for s, srf in enumerate(types.surface):
         if s != sole and srf.status.may_be_sole and can_be_faulty(srf):
             if c.has_eG and any_remains(srf, ALL):
@@ -212,19 +221,19 @@ def others_dismissed(types, sole):
                 if type_remains(srf, h):
                     if not FOLLOWS_COMMAND[h]:
                         return False
-                    n = max(n, WAIT_HALF_CYCLES[h])
-    return types.surface[sole].evidence.n_anomalous >= n * c.half_frames
+                    wait_half_cycles = max(wait_half_cycles, WAIT_HALF_CYCLES[h])
+    return types.surface[sole].evidence.n_anomalous >= wait_half_cycles * c.half_frames
 
 
 @kernel
 def type_on_surface(c, srf):
-    """The type of the fault on a surface, taken to be at fault; TYPE_UNDECIDED while more than one fits or
-    one may yet show itself.
+    """The type of the fault on a surface, taken to be at fault, after half a cycle of anomalous frames in
+    which it is not hidden; TYPE_UNDECIDED while more than one fits or one may yet show itself.
 
-        errors of effects (has_eG)       the sole type left, once it has shown itself
-        a constant type left             the sole constant type, unless it can be another
-        no constant type left            the sole varying type that need not show itself, unless it can be
-                                         another; if there is none, the sole one that has shown itself
+        errors of effects (has_eG)   the sole type, once it is shown
+        a constant type remains      the sole constant type, unless it can be another
+        no constant type remains     the sole varying type that need not show itself, unless another can look
+                                     like it; if there is none, the sole one that must and has
     """
     if srf.evidence.n_anomalous < c.half_frames or may_be_hidden(c, srf):
         return TYPE_UNDECIDED
@@ -244,10 +253,9 @@ def type_on_surface(c, srf):
 
 @kernel
 def decide_single(types, past, layout, t):
-    """The finding on the surface and, when it is certain, on the type, for
-    `conclusion.record_decision`.
+    """The finding on the surface and, when it is certain, on the type, for `conclusion.record_decision`.
 
-    past: that of the frame before, which gives the instants of what has not changed; t s.
+    past gives the times of what has not changed since the frame before; t s.
     """
     s = find_surface(types, layout)
     for i, srf in enumerate(types.surface):
@@ -270,7 +278,7 @@ def update_status(srf, is_isolated, kind, t):
 
 @kernel
 def finding_on_surface(types, past, layout, s, t):
-    """The finding on surface s, or if s is NOT_ISOLATED or UNANTICIPATED."""
+    """The finding on surface s, or that of s = NOT_ISOLATED or UNANTICIPATED."""
     if s >= 0:
         status = types.surface[s].status
         kind = status.fault_type
@@ -280,129 +288,5 @@ def finding_on_surface(types, past, layout, s, t):
 
 @kernel
 def estimator_of_fault(layout, s, h):
-    """The estimator that stands for a fault of this type (TYPE_UNDECIDED if open) on surface s."""
+    """The estimator that stands for a fault of type h (TYPE_UNDECIDED if open) on surface s."""
     return layout.loss[s] if h >= 0 and MODE[h] == SCALE_COMMAND else layout.position[s]
-
-
-@kernel
-def choose_mode(srf):
-    """The mode of accommodation for a surface at fault as far as is known.
-
-    SUBTRACT_OFFSET subtracts what the last frame shows to be off. It serves a type of another mode meanwhile,
-    and moves the command, so that a surface that does not follow shows in the next frame.
-    """
-    if constant_remains(srf):
-        for mode in (GIVE_UP, SCALE_COMMAND, WAIT_FOR_SURFACE):
-            if serves_constants(srf, mode):
-                return mode
-    else:
-        for mode in (SCALE_COMMAND, WAIT_FOR_SURFACE, GIVE_UP):
-            if any_remains(srf, VARYING_OF_MODE[mode]):
-                return mode
-    return SUBTRACT_OFFSET
-
-
-@kernel
-def serves_constants(srf, mode):
-    """Whether a mode is that of some type of constant parameter left, and serves all of them."""
-    is_own = False
-    for h in range(N_CONSTANT):
-        if type_remains(srf, h):
-            is_own = is_own or MODE[h] == mode
-            serves_end = END_TYPE[h] >= 0 and type_remains(srf, END_TYPE[h]) and SERVES[mode, END_TYPE[h]]
-            if not (SERVES[mode, h] or serves_end):
-                return False
-    return is_own
-
-
-@kernel
-def presumed_surface(types, layout):
-    """The surface that the law acts upon while none is isolated, in pairs none of pitch: the likeliest, or
-    NO_SURFACE.
-
-    It acts before all doubt is gone, since it can take it back. Of elevator and flap it does not matter which
-    is thought to be off, as long as both follow their commands: the moment is the same.
-    """
-    pair = types.pair
-    if pair.enabled and not pair.group_alarm[PITCH_GROUP]:
-        return NO_SURFACE
-    for s, srf in enumerate(types.surface):
-        if srf.status.is_isolated and (layout.group[s] == PITCH_GROUP or not pair.enabled):
-            return NO_SURFACE
-    sole = sole_surface(types.surface, True)
-    if sole >= 0:
-        return sole
-    for s, srf in enumerate(types.surface):
-        first = s == layout.main[PITCH] if pair.enabled else can_be_faulty(srf)
-        if layout.group[s] == PITCH_GROUP and first:
-            return s
-    return NO_SURFACE
-
-
-@kernel
-def clear_modes(surfs):
-    """Let the law act upon no surface."""
-    for srf in surfs:
-        srf.accommodation.mode = -1
-
-
-@kernel
-def accommodate(types, layout):
-    """Settle what the law does about each surface whose fault shows, or did less than MAX_SILENCE_S ago.
-    Returns the lead, which the supervisor follows, and what is done about it: a replaced elevator leads
-    before all others."""
-    lead, mode, presumed = NO_SURFACE, -1, presumed_surface(types, layout)
-    clear_modes(types.surface)
-    for s, srf in enumerate(types.surface):
-        if srf.status.is_isolated or s == presumed:
-            possible = srf.status.is_isolated == 1 or can_be_faulty(srf)
-            own = choose_mode(srf) if possible else SUBTRACT_OFFSET
-            count_silence(srf, own, possible)
-            if srf.accommodation.n_silent * types.config.dt < MAX_SILENCE_S - _TIME_TOLERANCE_S:
-                srf.accommodation.mode = own
-                leads = s == layout.main[PITCH] and own in (SCALE_COMMAND, GIVE_UP)
-                if lead == NO_SURFACE or leads:
-                    lead, mode = s, own
-    return lead, mode
-
-
-@kernel
-def count_silence(srf, mode, possible):
-    """Count the frames since the fault of a surface has shown, n_silent. It shows in a frame that agrees with
-    its deflection error (`deflection_error`), and always if the mode scales the command.
-
-    possible: whether the surface can be faulty.
-    """
-    last, acc = srf.last, srf.accommodation
-    p = deflection_error(srf, possible) + last.u
-    agrees = last.lo <= p <= last.hi or mode == SCALE_COMMAND
-    acc.n_silent = 0 if agrees else acc.n_silent + 1
-
-
-@kernel
-def deflection_error(srf, possible):
-    """Return the deflection error of a surface, rad: by the types left if it is at fault, or as the last
-    frame shows it."""
-    if possible:
-        for h in ERROR_TYPES:
-            if type_remains(srf, h):
-                e = registry.deflection_error(h, srf, h)
-                if np.isfinite(e):
-                    return e
-                break
-    return last_error(srf)
-
-
-@kernel
-def remaining_effectiveness(types, layout, est, s):
-    """Return the remaining effectiveness of surface s, dimensionless.
-
-    The estimator fits both axes of a surface, so with a second fault the set of a constant loss is used. When
-    all types are diagnosed, every surface has an estimator of its loss (isolation.py).
-    """
-    srf = types.surface[s]
-    if types.pair.enabled and can_be_faulty(srf):
-        for h in range(N_CONSTANT):
-            if MODE[h] == SCALE_COMMAND and type_remains(srf, h):
-                return set_middle(srf, h)
-    return 1.0 + est[layout.loss[s]].theta[layout.dominant_axis[s]]

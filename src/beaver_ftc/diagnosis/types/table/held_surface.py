@@ -1,9 +1,13 @@
-"""Surfaces that do not follow their command: stuck (p = c), float (p = 0), hardover (p runs to a stop).
+"""Surfaces that do not follow their command: stuck, float and hardover.
 
-*Hardover*: by each frame the surface has come at least as far as its least rate takes it, and it stays.
+    stuck      p = c, the position of the jam, which is the parameter
+    float      p = 0, neutral, or the stop that is nearest to it
+    hardover   p runs to a stop and stays there; by each frame it has come at least as far as the least rate
+               of a runaway takes it
 
-A row says where its type holds the surface (`deflection_range`); release.py does the rest. Symbols:
-types/__init__.py.
+The three share one way of being judged: a row says where its type holds the surface (`deflection_range`), and
+release.py tests whether the judged frame agrees with this, or with a return after a release. Each kernel has
+the name of its type and of the slot that it fills. Symbols: types/__init__.py.
 """
 
 import numpy as np
@@ -59,8 +63,8 @@ def float_error(srf, h):
     return clip_travel(srf, 0.0) - srf.last.u
 
 
-def float_deflection(fdi: np.void, s: int, h: int) -> float | None:
-    """Deflection of surface s afloat, rad."""
+def float_parameter(fdi: np.void, s: int, h: int) -> float | None:
+    """Deflection of surface s when it floats, rad."""
     return neutral_of(lower_stop(fdi, s, h), upper_stop(fdi, s, h))
 
 
@@ -127,15 +131,13 @@ TYPES = (
         deflection_error=float_error,
         deflection_error_precedence=1,
         deflection_relation=DeflectionRelation(
-            0.0,
-            theta_is_share=False,
-            theta_span=lambda low, high: (neutral_of(low, high),) * 2
+            0.0, theta_is_share=False, theta_span=lambda low, high: (neutral_of(low, high),) * 2
         ),
-        estimate_parameter=float_deflection,
+        estimate_parameter=float_parameter,
     ),
     FaultType(
-        name="hardover", description="hardover up", has_constant_parameter=True, sort_rank=4, holds_surface=True,
-        deflection_range=up_range, stop_direction=1,
+        name="hardover", description="hardover up", has_constant_parameter=True, sort_rank=4,
+        holds_surface=True, deflection_range=up_range, stop_direction=1,
         accommodation_mode=GIVE_UP, frames_test="runaway",
         estimate_parameter=upper_stop,
     ),

@@ -6,7 +6,7 @@ surfaces carry pitch, turn a demand into the command, and compute what of the de
 `control/state.py` has the table of the laws, reference.py what they follow. Words for a surface at fault:
 
     given up    a law divides by no effectiveness of it: less is left than `least_effectiveness`
-    withdrawn   given up by the default law's own observer, perhaps for a while (`withdraw`, evidence.py)
+    withdrawn   given up by the default law's own observer, perhaps for a while (withdrawal.py)
     parked      commanded to its trim, because it does not follow its command or is withdrawn
     lost        of pitch: no surface can give it (`pitch_is_lost`); of authority: a surface is slow or parked
 """

@@ -145,8 +145,7 @@ def solve(G, main, demand, out):
 def unexplained(control: np.void) -> np.ndarray:
     """What the law attributes to no model, (3,) rad/s2: the rivals estimate nothing, and hand on what the law
     before them had found (control.CompiledLaw)."""
-    inherited: np.ndarray = control["compiled_rivals"]["memory"]["inherited"].copy()
-    return inherited
+    return np.array(control["compiled_rivals"]["memory"]["inherited"])
 
 
 def begin(control: np.void, before: np.void, unexplained: np.ndarray, learnt: np.ndarray) -> None:

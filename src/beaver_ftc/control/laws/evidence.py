@@ -1,38 +1,32 @@
-"""What the default law finds of a surface at fault by itself: how effective it is, and whether to use it.
+"""Effectiveness of the surface that leads an axis, from the innovation of the law's observer.
 
-*Effectiveness* of the surface that leads an axis, from the innovation of the law's observer. A surface with
-effectiveness 1 + theta gives theta G u more than a healthy one. theta is the least-squares fit of psi, the
-observer's answer to G u, to the innovation e of an observer that assumes a healthy surface [Ljung1999, ch.
-13: a prediction error in a closed loop]:
+A surface with effectiveness 1 + theta gives theta G u more than a healthy one. theta is the least-squares fit
+of psi, the observer's answer to G u, to the innovation e of an observer that assumes a healthy surface
+[Ljung1999, ch. 13: a prediction error in a closed loop]:
 
     theta = (sum psi e + lam (diagnosed - 1)) / (sum psi^2 + lam),   lam = mean e^2 / UNSURE^2
 
-The sums fade over MEMORY_S; lam is the weight of `diagnosed`, the diagnosis' estimate of the effectiveness.
-The diagnosis estimates by an equation error. In a closed loop this estimate is too low in gusts, because the
-command answers the gust, which hides what the surface gives. The fit is too high with a noisy gyro, because
-the noise is in the command as well as in the innovation. The law divides by the larger of both, so that a
-loop is no faster than its margins allow.
+    e, psi      rad/s            innovation, and answer to G u, of one axis
+    G u         rad/s2           angular acceleration by the healthy surface
+    lam         (rad/s)^2        weight of the diagnosis' estimate
+    diagnosed                    the diagnosis' estimate of the effectiveness, 0 to 1
 
-*Use.* The law withdraws a surface that is of doubtful use and stays at its stop (`withdraw`).
+The sums fade over MEMORY_S. Why two estimates: the diagnosis estimates by an equation error. In a closed loop
+this estimate is too low in gusts, because the command answers the gust, which hides what the surface gives.
+The fit is too high with a noisy gyro, because the noise is in the command as well as in the innovation. The
+law divides by the larger of both, so that a loop is no faster than its margins allow.
 """
 
 from math import exp
 
 from beaver_ftc.compiled import kernel, record
 from beaver_ftc.control.laws.effectiveness_estimator import observer_response
-from beaver_ftc.diagnosis.state import PITCH
 
 MEMORY_S = 5.0  # time constant of the sums: the swing of a slow reference
 UNSURE = 0.2  # assumed standard deviation of the diagnosis' estimate, which the law takes before it has sums
 # A surface with less effectiveness counts as lost: half of the default `least_effectiveness`, also if a
 # scenario sets another one.
 NOTHING_LEFT = 0.05
-# A doubtful surface is withdrawn after so long at its stop: the first if another surface takes its place.
-PATIENCE_S, LONG_PATIENCE_S = 0.5, 1.0
-RETRY_S = 20.0  # If another surface takes its place, a withdrawn one is used again after this time.
-# A frame off the stop takes STOP_RECOVERY - 1 frames from the time at the stop: a command that swings leaves
-# the stop only briefly.
-STOP_RECOVERY = 1.5
 
 # Fading sums over frames (3,), for the main surface of each axis: product of psi e, square of psi^2,
 # innovation of e^2, (rad/s)^2, and frames of 1. named: whether the diagnosis has named the surface before.
@@ -42,12 +36,6 @@ SUMS = record(product=3, square=3, innovation=3, frames=3, named=(int, 3))
 def derive_fading(dt_s: float) -> float:
     """Share of the past that is forgotten in a frame of dt_s seconds."""
     return 1.0 - exp(-dt_s / MEMORY_S)
-
-
-@kernel
-def is_replaced(layout, s):
-    """Whether another surface can take the place of surface s."""
-    return s == layout.main[PITCH] or s == layout.stand_in
 
 
 @kernel
@@ -117,47 +105,3 @@ def accumulate(config, memory, i, effectiveness, moment, innovation):
         (sums.frames, 1.0),
     ):
         total[i] += term - fading * total[i]
-
-
-@kernel
-def is_doubtful(assessment, sums, layout, s, target, least):
-    """Whether surface s, which is named, may be of no use: another surface can take its place; or its type is
-    open or its effectiveness `target` below `least`, and the observer does not see it act either."""
-    if is_replaced(layout, s):
-        return True
-    is_open = assessment.diagnoses_all_types and assessment.accommodation_mode[s] < 0
-    return (is_open or target < least) and not is_effective(sums, layout.main, s, least)
-
-
-@kernel
-def withdraw(memory, layout, s, saturated, suspected, dt):
-    """Withdraw surface s if it is suspected of a fault and has stood at its stop for a while.
-
-    Such a surface does not follow its command, and at its stop the command does not show why: jams, offsets
-    and losses look alike. In trim the reason shows. So a surface that another one replaces is tried again.
-    T, s: at_stop_s, the time at the stop; t, s: out_of_use_s, the time in trim since it was withdrawn.
-
-        state       condition                               T                      t          next state
-        any         not suspected                           0                      0          in use
-        withdrawn   t > RETRY_S, another takes its place    0                      0          in use
-        withdrawn   otherwise                               0                      t + dt     withdrawn
-        in use      not saturated                           max(T + dt - k dt, 0)  0          in use
-        in use      saturated, T > patience                 0                      0          withdrawn
-        in use      saturated, otherwise                    T + dt                 0          in use
-
-    T, t in a condition count this frame. patience: PATIENCE_S if another surface takes its place, else
-    LONG_PATIENCE_S. k: STOP_RECOVERY.
-    """
-    T, t = memory.at_stop_s, memory.out_of_use_s
-    if not suspected:
-        memory.withdrawn[s], T[s], t[s] = 0, 0.0, 0.0
-    elif memory.withdrawn[s]:
-        t[s] += dt
-        if t[s] > RETRY_S and is_replaced(layout, s):
-            memory.withdrawn[s], t[s] = 0, 0.0
-    else:
-        T[s] += dt
-        if not saturated:
-            T[s] = max(T[s] - STOP_RECOVERY * dt, 0.0)
-        elif T[s] > (PATIENCE_S if is_replaced(layout, s) else LONG_PATIENCE_S):
-            memory.withdrawn[s], T[s] = 1, 0.0

@@ -18,8 +18,8 @@ instant too.
 Gains. A loop has Kp = s and w_o = RATIO s; loop_design.py derives s, 1/s, from what is declared.
 
 Effectiveness of a surface at fault. The law takes the diagnosis' estimate, or that from the observer's
-innovation if it is larger, and withdraws a surface that stays at its stop (evidence.py). Once no known fault
-fits, the law estimates all surfaces at once (effectiveness_estimator.py).
+innovation if it is larger (evidence.py), and withdraws a surface that stays at its stop (withdrawal.py). Once
+no known fault fits, the law estimates all surfaces at once (effectiveness_estimator.py).
 """
 
 from math import exp, sqrt
@@ -41,14 +41,12 @@ from beaver_ftc.control.laws.evidence import (
     SUMS,
     accumulate,
     derive_fading,
-    is_doubtful,
-    is_replaced,
     larger_estimate,
     restart_at_naming,
-    withdraw,
 )
 from beaver_ftc.control.laws.loop_design import Loop, corrections, fastest, lead_of
 from beaver_ftc.control.laws.reference import advance
+from beaver_ftc.control.laws.withdrawal import is_doubtful, is_replaced, withdraw
 from beaver_ftc.control.thrust import between
 from beaver_ftc.design.model import effectiveness as control_effectiveness
 from beaver_ftc.design.model import own_damping
@@ -65,17 +63,22 @@ STAND_IN = 3  # the last of these rows
 
 
 def configure(law: np.void, control: np.void, prediction: np.void, declared: Declared, y: np.ndarray) -> None:
-    """Fill the leads, and the gains of each loop at each point of the schedule (control.CompiledLaw).
+    """Fill the law's configuration (control.CompiledLaw; fields: `config_dtype`) in three steps:
 
-    y (n_y,): the signals measured in trim. A loop is an axis and the surface s that moves it. Each surface
-    goes the share `approach` of the way to its command in a frame.
+        1  the lead of each surface, which goes the share `approach` of the way to its command in a frame
+        2  the loops, each an axis with the surface s that moves it: roll, pitch, yaw and, if a surface can
+           stand in, pitch by that surface; this order is that of the rows of the tables of gains
+        3  the gains of each loop at each point of the schedule: the fastest Kp that margins and noise allow
+
+    y (n_y,): the signals measured in trim. G (points, 3, n) rad/s2 per rad. keep: pole of a gyro's lag over a
+    frame, exp(-bandwidth dt); 0 for a gyro without lag.
     """
     config, layout, design = law["config"], control["layout"], prediction["design"]
     dt, share = 1.0 / declared.rate_hz, 1.0 / declared.substeps
     points = schedule_points(declared, y)
     G = np.array([control_effectiveness(design, point) for point in points])
     approach = 1.0 - (1.0 - prediction["actuators"]["approach"]) ** declared.substeps
-    lead = [lead_of(float(of_surface)) for of_surface in approach]
+    lead = [lead_of(float(share_of_way)) for share_of_way in approach]
     fill(config, dt=dt, share=share, qdyn=points[:, QDYN], fading=derive_fading(dt), lead=lead)
     loops = list(enumerate(layout["main"].tolist()))
     if layout["stand_in"] >= 0:
@@ -330,8 +333,7 @@ def targets(reference, i, share):
 
 def unexplained(control: np.void) -> np.ndarray:
     """What the law attributes to no model, (3,) rad/s2 (control.CompiledLaw)."""
-    found: np.ndarray = control["rejecting"]["observer"]["disturbance"].copy()
-    return found
+    return np.array(control["rejecting"]["observer"]["disturbance"])
 
 
 def begin(control: np.void, before: np.void, unexplained: np.ndarray, learnt: np.ndarray) -> None:

@@ -1,5 +1,8 @@
 """The fault isolation estimators (FIE), their sets of parameters, and the decision among them.
 
+The kernels stand in this order: set membership of one frame; records and configuration; then what happens in
+a frame, which is effect of each fault, tests that exclude it, decision, and estimator.
+
 The estimators start at detection:
 
     xhats' = -Lambdas (xhats - x) + f + G u + h + Zs ths + Oms ths'
@@ -41,13 +44,18 @@ Symbols of the kernels:
     G (3, n), Gu (3, n)           mean of G, rad/s2 per rad, and effect of each healthy surface, rad/s2
     e_Gu (3, n) rad/s2            error of that mean if a fault changes within the frame
     phi                           effect of a fault, h + theta Z within +- r (EFFECT_RECORD)
-    lo, hi; between               interval of theta, or of a position, rad
+    known set                     [theta_min, theta_max], to which the hypothesis limits theta
+    interval = (lo, hi)           of theta: without unit for a loss, rad for a position
     Om, R_pos                     Omega, and the same of the positive part of Z
     B, B_lag rad/s                bound on the filtered uncertainty, and its part with a memory
     th, P                         estimate of theta and its variance
-    s, i, j                       surface, axis, estimator
+    s, i, j                       surface, axis, estimator; in a loop over pairs of axes, j is the second axis
     iso, fie, bank, bound, emap   records: isolation, estimator, bank, bounds, map of the model's error
     abrupt                        a fault is declared to stay as it is
+
+Words for an estimator: *excluded*, its fault is refuted and no longer a candidate; *weakly excluded* (weak),
+its fault may be refuted, so it is not isolated; *pending*, a test has refuted the fault, and the exclusion
+waits for the sensor monitor; *confirmed*, its loss has been proved by likelihood.
 """
 
 from math import exp
@@ -95,8 +103,8 @@ def eta_explains(nu, nu_max):
 
 @kernel
 def consistent_on(nu, nu_max, fie, phi, i):
-    """The theta of the known set with |nu_i - h_i - theta Z_i| <= nu_max_i + r_i; the whole set if axis i is
-    skipped, because it cannot exclude this fault.
+    """The interval of theta within the known set with |nu_i - h_i - theta Z_i| <= nu_max_i + r_i; the whole
+    known set if axis i is skipped (`fie.skip`): where pairs are diagnosed, a second fault may act on it.
     """
     if fie.skip[i]:
         return fie.theta_min, fie.theta_max
@@ -106,8 +114,8 @@ def consistent_on(nu, nu_max, fie, phi, i):
 
 @kernel
 def own_error(bound, s, i, u, level):
-    """max(eG u - eGu, 0) + extra, rad/s2: by how much the error of surface s at u rad exceeds that at its
-    command.
+    """max(eG u - eGu, 0) + extra, rad/s2: by how much the error of surface s on axis i at a distance of u rad
+    from neutral exceeds the error at its command. extra: of the map of the model's error, at this level.
     """
     return max(bound.eG[i, s] * u - bound.eGu[i, s], 0.0) + bound.extra[level, i]
 
@@ -118,10 +126,13 @@ def widen_error(fie, bound, nu, n_substeps):
 
         r <- r + max(eG (u + first) - eGu, 0) + extra
 
-    eta_bar contains these errors at the commanded position. They grow with u, the distance from neutral. How
-    far the surface can have been follows from the frame itself, on the axis of the largest Z, in N_ROUNDS
-    rounds that begin with its whole travel; every round gives a valid bound. The same holds for a map of the
-    model's error, which is for healthy surfaces.
+    eta_bar contains these errors at the commanded position. They grow with u, the largest distance from
+    neutral at which the surface can have been. The frame itself gives u, on the axis i of the largest |Z|:
+
+        u = travel;   N_ROUNDS times:   u <- min(u, max |interval of the position with the tolerance at u|)
+
+    Every round gives a valid bound. The same holds for a map of the model's error, which is for healthy
+    surfaces (`level`).
 
     If a frame has n substeps, the surface may at the first of them still be where it was a frame before. That
     is taken to be within u_far of neutral. For the mean position p the surface is then further out at the
@@ -133,38 +144,40 @@ def widen_error(fie, bound, nu, n_substeps):
             i = j
     first = 2.0 * fie.u_far / n_substeps if n_substeps > 1 else 0.0
     u, e = max(abs(fie.theta_min), abs(fie.theta_max)), bound.nu_max[i] + phi.r[i]
-    between = (fie.theta_min, fie.theta_max)
-    level = level_near(emap, fie, between, n_substeps)
+    interval = (fie.theta_min, fie.theta_max)
+    level = level_near(emap, fie, interval, n_substeps)
     for _ in range(N_ROUNDS):
-        more = own_error(bound, s, i, u + first, level)
-        lo, hi = explain(nu[i] - phi.h[i], e + more, phi.Z[i], fie.theta_min, fie.theta_max)
+        e_own = own_error(bound, s, i, u + first, level)
+        lo, hi = explain(nu[i] - phi.h[i], e + e_own, phi.Z[i], fie.theta_min, fie.theta_max)
         if lo > hi:
             break
-        u, between = min(u, max(abs(lo), abs(hi))), (lo, hi)
-        level = level_near(emap, fie, between, n_substeps)
+        u, interval = min(u, max(abs(lo), abs(hi))), (lo, hi)
+        level = level_near(emap, fie, interval, n_substeps)
     fie.u_far = u
     if emap.one_free:
-        fie.share_far = share_used(emap, s, between, fie.share_far, n_substeps)
+        fie.share_far = share_used(emap, s, interval, fie.share_far, n_substeps)
     for j in range(3):
         phi.r[j] += own_error(bound, s, j, u + first, level)
 
 
 @kernel
-def level_near(emap, fie, between, n_substeps):
-    """The level of the map that covers a surface whose mean position is in `between`; 0 without a map."""
+def level_near(emap, fie, interval, n_substeps):
+    """The level of the map that covers a surface whose mean position is in the interval, rad; 0 without a
+    map."""
     if not emap.one_free:
         return 0
-    return level_of_share(emap, share_used(emap, fie.surface, between, fie.share_far, n_substeps))
+    return level_of_share(emap, share_used(emap, fie.surface, interval, fie.share_far, n_substeps))
 
 
 @kernel
 def consistent_on_axes(nu, nu_max, fie, phi, axis):
-    """The theta that agree on every axis; if `axis` >= 0, on that axis, and on those where Z = 0."""
-    between = fie.theta_min, fie.theta_max
+    """The interval of theta that is consistent on every axis; if `axis` >= 0, on that axis alone, and on
+    those where Z = 0, which exclude the fault or say nothing."""
+    interval = fie.theta_min, fie.theta_max
     for i in range(3):
         if axis < 0 or i == axis or phi.Z[i] == 0.0:
-            between = intersect(between, consistent_on(nu, nu_max, fie, phi, i))
-    return between
+            interval = intersect(interval, consistent_on(nu, nu_max, fie, phi, i))
+    return interval
 
 
 @kernel
@@ -191,12 +204,12 @@ def narrow_sets(fie, nu, nu_max, shared):
     """
     for i in range(3):
         eps = fie.residual[i] + fie.Om[i] * fie.theta[i]
-        between = explain(eps, fie.B[i], fie.Om[i], fie.theta_min, fie.theta_max)
-        between = intersect(between, consistent_on(nu, nu_max, fie, fie.effect, i))
+        interval = explain(eps, fie.B[i], fie.Om[i], fie.theta_min, fie.theta_max)
+        interval = intersect(interval, consistent_on(nu, nu_max, fie, fie.effect, i))
         for j in range(3):
             if shared or j == i:
-                known = fie.set_lo[j], fie.set_hi[j]
-                fie.set_lo[j], fie.set_hi[j] = intersect(known, between)
+                before = fie.set_lo[j], fie.set_hi[j]
+                fie.set_lo[j], fie.set_hi[j] = intersect(before, interval)
     for i in range(3):
         if fie.set_lo[i] > fie.set_hi[i]:
             return False
@@ -205,8 +218,8 @@ def narrow_sets(fie, nu, nu_max, shared):
 
 @kernel
 def add_to_mean(mean, phi, w, begins):
-    """mean <- mean + w phi (EFFECT_RECORD); w: share of a frame in its block. If the block `begins` with this
-    frame, the mean is zero before."""
+    """mean <- mean + w phi, each an EFFECT_RECORD; w: share of a frame in its block. If the block `begins`
+    with this frame, the mean is zero before."""
     if begins:
         mean.h[:] = mean.Z[:] = mean.r[:] = 0.0
     for i in range(3):
@@ -222,13 +235,15 @@ EFFECT_RECORD = record(h=3, Z=3, r=3)
 ESTIMATOR_RECORD = record(
     hypothesis_kind=int, surface=int,
     theta_min=float, theta_max=float,  # the known set of theta
+    # skip: whether an axis cannot exclude the fault; residual, its thresholds mu_lo and mu_hi: rad/s
     excluded=int, excluded_at_s=float, pending=int, skip=(int, 3), xhat=3, residual=3, mu_lo=3, mu_hi=3,
-    confirmed=int, weak=int, unlikely=int,  # by likelihood ratios
-    # R_pos: as Omega, of the positive part of Z; residual, B, mu_lo, mu_hi: rad/s
+    confirmed=int, weak=int, unlikely=int,  # by likelihood ratios; unlikely: in this frame
+    # R_pos: as Omega, of the positive part of Z; B, B_lag: rad/s
+    # effect: of the frame; mean_effect: of a block of frames (examination.py)
     Om=3, R_pos=3, B=3, B_lag=3, theta=3, P=3, effect=EFFECT_RECORD,
     mean_effect=EFFECT_RECORD,
-    # in the last frame: the largest mean deflection that the surface can have had, rad; the largest share of
-    # its travel that it can have used
+    # In the last frame: the largest distance from neutral that the surface's mean position can have had, rad;
+    # the largest share of its travel that it can have used.
     u_far=float, share_far=float,
     # test on the residuals of the bank (filters.py): the parity direction m; the reach, rad/s, by filter, on
     # roll, pitch, yaw and along m
@@ -242,14 +257,17 @@ def isolation_dtype(n: int) -> np.dtype:
     """The isolation estimators, a loss and a position of each surface at most, and how the decision among
     them is sharpened.
 
-    n_estimators: how many are in use; mu_kind: INTERVAL_THRESHOLD, PUBLISHED_THRESHOLD or CONSTANT_THRESHOLD.
-    a (3,): decay per frame of the estimators' filters, by axis; forget: factor on the information of the
-    least-squares estimate, per frame; gradient: theta is estimated by gradient with this `gain`, not by least
-    squares; free: an estimate may leave the known set.
-    Tests: reach (is a residual of the bank within the fault's reach?), shared (the axes share one theta),
-    narrows (the sets of a constant theta are intersected over frames).
-    hold_s: time, s, for which the last estimator left must have been alone before its fault is isolated.
-    losable (n,): whether damage can take a surface.
+    n_estimators      how many are in use
+    mu_kind           of the residual: INTERVAL_THRESHOLD, PUBLISHED_THRESHOLD or CONSTANT_THRESHOLD
+    a (3,)            decay per frame of the estimators' filters, by axis
+    forget            factor on the information of the least-squares estimate, per frame
+    gradient, gain    whether theta is estimated by gradient and not by least squares, and with which gain
+    free              whether an estimate may leave the known set
+    reach             test: is a residual of the bank within the fault's reach?
+    shared            the axes share one theta
+    narrows           the sets of a constant theta are intersected over frames
+    hold_s            s, for which the only remaining estimator must have been alone before it is isolated
+    losable (n,)      whether damage can take a surface
     """
     config = record(
         n_estimators=int, mu_kind=int, forget=float, a=3, reach=int, shared=int, narrows=int, gradient=int,
@@ -270,8 +288,8 @@ EstimatorEntry = tuple[str, int, int]
 def list_estimators(fault_class: str, aircraft: Aircraft) -> tuple[EstimatorEntry, ...]:
     """The isolation estimators of a fault class, in the bank's order.
 
-    published: a loss of the surface that leads each axis, and of what turns with it. all: those, a loss of
-    each stand-in, and a position of every surface.
+    published: a loss of the surface that leads each axis, and of what turns with it
+    all: those losses, a loss of each stand-in, and a position of every surface
     """
     index = {name: s for s, name in enumerate(aircraft.surfaces)}
     if fault_class == "published":
@@ -301,7 +319,7 @@ def configure_isolation(
     )  # fmt: skip
     # The range of a position contains 0, because a surface that has lost effectiveness acts nearer to 0.
     ends = np.array([np.minimum(travel[0], 0.0), np.maximum(travel[1], 0.0)])
-    for fie, (_, kind, s) in zip(iso["estimator"], rows, strict=False):
+    for fie, (_, kind, s) in zip(iso["estimator"], rows, strict=False):  # the record has room for more
         lo, hi = LOSS_RANGE if kind == LOSS else ends[:, s]
         fill(fie, hypothesis_kind=kind, surface=s, theta_min=lo, theta_max=hi)
         if config.pairs:  # each plane by itself: pitch by its two surfaces, roll and yaw by theirs
@@ -367,8 +385,16 @@ def update_residual(fie, kind, x):
 
 @kernel
 def fault_possible(iso, fie, bank, nu_max, abrupt, x, started):
-    """True if no test that is switched on excludes the fault of estimator fie.
+    """True if no test that is switched on excludes the fault of estimator fie:
 
+        test                    switched on for
+        residual, thresholds    every estimator
+        reach                   every estimator, if `reach`
+        one theta, one frame    positions, and with `shared` losses too; not in the first frame of the
+                                isolation unless `reach`
+        sets over frames        losses, if `narrows` and abrupt; not in the first frame
+
+    The tests run in this order, and none runs after one that excludes the fault.
     started: the isolation started a frame or more ago.
     """
     possible = update_residual(fie, iso.config.mu_kind, x)
@@ -383,7 +409,8 @@ def fault_possible(iso, fie, bank, nu_max, abrupt, x, started):
 
 @kernel
 def exclude_fault(fie, t, waits, in_doubt):
-    """Exclude a fault from t s on; if `waits`, from the next frame on; if `in_doubt`, once that is over."""
+    """Exclude a fault from t s on. If `waits`, the exclusion is pending until the next frame; if `in_doubt`
+    (a gyro may be the cause of the alarm), until the doubt is over."""
     if in_doubt or (waits and not fie.pending):
         fie.pending = 1
     elif not fie.excluded:
@@ -398,16 +425,16 @@ def decide_isolation(iso, t):
     excluded estimator is not isolated unless it is confirmed. On an aircraft that declares damage, neither is
     one that has been the only one left for less than `hold_s`.
     """
-    n, left, last = 0, NOT_ISOLATED, -np.inf
+    n, remaining, last_exclusion_s = 0, NOT_ISOLATED, -np.inf
     for j, fie in enumerate(iso.estimator[: iso.config.n_estimators]):
         if fie.excluded:
-            last = max(last, fie.excluded_at_s)
+            last_exclusion_s = max(last_exclusion_s, fie.excluded_at_s)
         else:
             n += 1
-            left = NOT_ISOLATED if fie.weak and not fie.confirmed else j
+            remaining = NOT_ISOLATED if fie.weak and not fie.confirmed else j
     if n == 0:
         return UNANTICIPATED
-    return left if n == 1 and t - last >= iso.config.hold_s else NOT_ISOLATED
+    return remaining if n == 1 and t - last_exclusion_s >= iso.config.hold_s else NOT_ISOLATED
 
 
 @kernel
@@ -431,15 +458,15 @@ def least_squares_step(fie, i, eps, forget):
 
 @kernel
 def joint_least_squares(fie, forget):
-    """A least-squares step of one theta shared by the axes: each axis corrects the residual that the axes
-    before left; returns the step."""
+    """A least-squares step of one theta shared by the axes, axis after axis: eps_i = residual_i - Om_i total,
+    with the steps of the axes before in `total`. Returns the total. P is divided by `forget` once a frame."""
     total = 0.0
     for i in range(3):
         if i > 0:
             fie.theta[i], fie.P[i] = fie.theta[i - 1], fie.P[i - 1]
         if fie.effect.Z[i] != 0.0:
             total += least_squares_step(fie, i, fie.residual[i] - fie.Om[i] * total, forget)
-            forget = 1.0  # once a frame
+            forget = 1.0
     fie.theta[:], fie.P[:] = fie.theta[2], fie.P[2]
     return total
 
@@ -453,8 +480,9 @@ def advance_estimator(iso, fie, bound, x, F, dt):
         B_lag <- a B_lag + dt (eta_bar + r) + (1 - a) n_old         B = B_lag + n
         th <- P{th + dt gain Om eps} by gradient [Zhang2005, sec. IV], or by least squares
 
-    B_lag = B_eta + T_n; step: of th, Delta in isolation.md. x: at the start of the frame, as the residual
-    eps; fie.effect must be that of this frame.
+    B_lag = B_eta + T_n; step: that of th (Delta in isolation.md). x is measured at the start of the frame, as
+    is the residual eps; fie.effect must be that of this frame. The order matters: th moves before Om, which
+    then carries the step into xhat.
     """
     cfg, phi, th = iso.config, fie.effect, fie.theta
     for i in range(3):
@@ -491,21 +519,25 @@ def weigh_views(fie, views, cfg, forces, G):
 
 
 @kernel
-def update_likelihood(fie, cfg, blocks, iso, of, abrupt, hidden):
+def update_likelihood(fie, cfg, blocks, iso, loss_of, abrupt, hidden):
     """Fill `unlikely` of estimator fie; update its `confirmed` and `weak`.
 
+    confirmed    stays once it is set: what contradicts a loss later may be its end
+    weak         at least 1 if the likelihood excludes the loss, with no end of a loss in pitch allowed for
+    unlikely     whether it excludes the loss also with such an end allowed for
+
     hidden: a gust may hide an error of a vane from the sensor monitor. An exclusion may then be the effect of
-    that error, so all estimators become weakly excluded. cfg, blocks: of the statistical detector; of (n,):
-    index of the estimator of each surface's loss.
+    that error, so all estimators become weakly excluded. cfg, blocks: of the statistical detector; loss_of
+    (n,): index of the estimator of each surface's loss.
     """
     fies, s = iso.estimator, fie.surface
     fie.unlikely = 0
     if not fie.confirmed and (fie.weak or not abrupt):
         # a confirmed loss stays: what contradicts it later may be its end
-        fie.confirmed = statistical.confirms_loss(cfg, blocks, fies, of, s)
-    if fie.confirmed or not statistical.excludes_loss(cfg, blocks, fies, of, s, False, abrupt):
+        fie.confirmed = statistical.confirms_loss(cfg, blocks, fies, loss_of, s)
+    if fie.confirmed or not statistical.excludes_loss(cfg, blocks, fies, loss_of, s, False, abrupt):
         return
-    fie.unlikely = statistical.excludes_loss(cfg, blocks, fies, of, s, True, abrupt)
+    fie.unlikely = statistical.excludes_loss(cfg, blocks, fies, loss_of, s, True, abrupt)
     fie.weak = max(fie.weak, 1)
     if fie.unlikely and hidden:
         for other in fies[: iso.config.n_estimators]:

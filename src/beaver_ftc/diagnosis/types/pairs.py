@@ -2,18 +2,29 @@
 
 Elevator and flap move pitch alone, ailerons and rudder roll and yaw alone: each plane has its own verdict.
 
-*Roll and yaw*: two unknown deflections in two equations. Where both surfaces were follows exactly in every
-frame, whichever is at fault, and a surface is judged in those frames in which it was certainly off. One is
-named when the other alone cannot explain the flight; both are when neither can and each has a type left.
+*Roll and yaw*: two unknown deflections in two equations. In every frame the deflections of both surfaces
+follow from them, within the declared errors, whichever surface is at fault. A surface is judged in the frames
+in which it was certainly off its command. One surface is named if the other alone cannot explain the flight.
+Both are named if neither can, and a type remains on each.
 
-*Pitch*: two unknowns in one equation. A constant that explains everything on one surface is taken for one
-fault. Once that was named, with its constant, a second fault that refutes it is found on the other surface,
-whose deflection follows from what is known of the first, taken to last. If nothing on the other surface
-explains that either, the name of the first is withdrawn. Anything else stays open.
+*Pitch*: two unknown deflections in one equation, so an assumption is necessary:
 
-A surface's group and the other surface in it are looked up in the layout. types: of `fault_types_dtype`;
-past: of `conclusion_dtype`, of the frame before; bank: the detection filters. Other symbols:
-types/__init__.py.
+    1  A constant fault that explains everything on one surface is taken for the only fault (`sole_pitch`).
+    2  Once it can be no varying fault, its sets are stored (`store_first`), and it is taken to last.
+    3  If the flight refutes it, a second fault begins on the other surface (`begin_second_if_shown`). The
+       deflection of that surface follows from the stored sets of the first (`locate_second`).
+    4  If nothing on the other surface explains the flight, the name of the first is withdrawn
+       (`update_second`).
+
+In any other case the plane of pitch stays open.
+
+    types           record of `fault_types_dtype`
+    past            record of `conclusion_dtype`, of the frame before
+    bank            detection filters
+    layout          gives the group of a surface and the other surface in it (partner)
+    srf1, srf2      surfaces of the first and of the second fault in pitch
+
+Other symbols: verdict.py, types/__init__.py.
 """
 
 import numpy as np
@@ -36,7 +47,8 @@ from beaver_ftc.diagnosis.types.verdict import NO_SURFACE, can_be_faulty, consta
 
 @kernel
 def latch_groups(pair, bank):
-    """Latch for each group of surfaces whether a residual of the bank has exceeded its threshold."""
+    """Latch for each group of surfaces whether a residual of the bank has exceeded its threshold on an axis
+    of the group."""
     for i in range(3):
         if leaves_bound(bank, i):
             pair.group_alarm[PITCH_GROUP if i == PITCH else LATERAL_GROUP] = 1
@@ -44,12 +56,14 @@ def latch_groups(pair, bank):
 
 @kernel
 def locate_one(srf, own, other, nu, nu_max):
-    """Find where one of ailerons and rudder was in the elapsed frame: nu = G (p - u) + eta solved for p, with
+    """Find where one of ailerons and rudder was in the elapsed frame: nu = G (p - u) + eta, two equations,
+    solved for this surface by Cramer's rule. False if it was nowhere within its reach.
 
-    p - u = (nu_L N - nu_N L) / (L1 N - N1 L),    |eta| <= nu_max + e
+        p - u = (nu_L N - nu_N L) / det +- (e_L |N| + e_N |L|) / |det|,    det = L1 N - N1 L
 
-    L, N: roll and yaw acceleration, rad/s2; L1, N1 per rad of this surface (own), L, N of the other. False:
-    nowhere within its reach.
+    nu_L, nu_N             rad/s2             innovation in roll and yaw
+    L1, N1; L, N           rad/s2 per rad     effect in roll and yaw of this surface (own); of the other
+    e_L, e_N               rad/s2             nu_max + r_own + r_other of the axis
     """
     L, N = other.Z[ROLL], other.Z[YAW]
     det = own.Z[ROLL] * N - own.Z[YAW] * L
@@ -70,7 +84,8 @@ def locate_lateral(types, layout, est, nu, nu_max):
 
 @kernel
 def constant_range(c, srf, k):
-    """Least and greatest deflection of a surface by frame k over the types of a constant left, rad."""
+    """Least and greatest deflection of a surface by frame k over the constant types that remain, within its
+    reach, rad."""
     lo, hi = np.inf, -np.inf
     for h in range(N_CONSTANT):
         if type_remains(srf, h):
@@ -95,10 +110,12 @@ def observe_pitch(types, layout, est, nu, nu_max):
 
 @kernel
 def locate_second(types, layout, est, nu, nu_max):
-    """Find the position of the second surface, given the sets of the first: p - u = (nu - M1 (p1 - u1)) /
-    M2.
+    """Find where the second surface was, given the interval (lo, hi) of the first (`constant_range`), rad:
 
-    M1, M2: pitch acceleration by the first and by the second surface, rad/s2 per rad.
+        p2 - u2 = (nu - M1 (p1 - u1)) / M2 +- (|M1| (hi - lo) / 2 + nu_max + r1 + r2) / |M2|
+
+    p1 = (lo + hi) / 2; M1, M2: pitch acceleration by each surface, rad/s2 per rad; nu, nu_max, r1, r2 of
+    pitch, rad/s2. If no deflection within reach fits, the second surface is deduced to be healthy.
     """
     s1 = types.pair.first_pitch
     s2 = layout.partner[s1]
@@ -117,7 +134,8 @@ def locate_second(types, layout, est, nu, nu_max):
 
 @kernel
 def observe_pairs(types, layout, est, bank, nu_max):
-    """Observe the elapsed frame, plane by plane, and judge the one before."""
+    """Observe the elapsed frame and judge the one before. The order matters: `locate_lateral` and
+    `observe_pitch` replace what `observe_surfaces` has found as if each surface were alone at fault."""
     nu = bank.output.innovation
     latch_groups(types.pair, bank)
     examination.observe_surfaces(types, layout, est, nu, nu_max)
@@ -136,14 +154,14 @@ def isolate_lateral(types, layout, t):
                     refuted (by deflections out of reach, or since all types of one are excluded), or a type
                     that has to show itself has not
     """
-    roll, yaw = types.surface[layout.main[ROLL]], types.surface[layout.main[YAW]]
-    both = not can_be_faulty(roll) and not can_be_faulty(yaw)
+    roller, yawer = types.surface[layout.main[ROLL]], types.surface[layout.main[YAW]]
+    both = not can_be_faulty(roller) and not can_be_faulty(yawer)
     refuted, explained = types.pair.lateral_outside == 1, True
-    for srf in (roll, yaw):
+    for srf in (roller, yawer):
         refuted = refuted or not verdict.any_remains(srf, ALL)
         explained = explained and verdict.explains_flight(srf)
     isolates = types.pair.group_alarm[LATERAL_GROUP] == 1 and not (both and (refuted or not explained))
-    for srf, other in ((roll, yaw), (yaw, roll)):
+    for srf, other in ((roller, yawer), (yawer, roller)):
         at_fault = isolates and not can_be_faulty(other)
         verdict.update_status(srf, at_fault, verdict.type_on_surface(types.config, srf), t)
     return both and refuted
@@ -151,10 +169,11 @@ def isolate_lateral(types, layout, t):
 
 @kernel
 def store_first(types, s):
-    """Store the sets of the first pitch fault; store them again once fewer types have been left for
-    `half_frames`.
+    """Store the sets of the first pitch fault; store them again once types that they contain have been
+    excluded for `half_frames`.
 
-    What refutes a type may be a second fault that begins to show, and is about to refute all of them.
+    The wait is necessary because a second fault that begins to show may refute one type first, and all of
+    them soon after: the sets from before it began must then still be there.
     """
     pair, srf, new = types.pair, types.surface[s], False
     kept = srf.first_sets
@@ -177,7 +196,8 @@ def has_second(types):
 
 @kernel
 def begin_second_if_shown(types, layout):
-    """Begin the diagnosis of a second pitch fault when the one known fault no longer explains the flight."""
+    """Begin the diagnosis of a second pitch fault once no constant type on the first surface explains the
+    flight: the first gets its stored sets back, and the second starts with no knowledge."""
     s1 = types.pair.first_pitch
     if s1 == NO_SURFACE or layout.partner[s1] < 0 or has_second(types):
         return
@@ -195,13 +215,13 @@ def begin_second_if_shown(types, layout):
 
 @kernel
 def dismiss_varying(c, srf):
-    """Whether a slow oscillation, a slow surface or a growing bias would have shown by now: the constant
-    that is left looks like none of them, none is hidden, and the flight has been anomalous for half a
-    cycle."""
+    """Whether no varying type needs to be considered any more: a slow oscillation, a slow surface or a
+    growing bias would have shown by now. The constant type looks like none of them, none is hidden, and the
+    flight has been anomalous for half a cycle."""
     imitated = verdict.can_be_another(srf, verdict.sole_type(srf, CONSTANT), False)
-    doubt = imitated or verdict.may_be_hidden(c, srf)
+    in_doubt = imitated or verdict.may_be_hidden(c, srf)
     long_enough = srf.evidence.n_anomalous >= c.half_frames
-    return long_enough and verdict.would_have_shown(c, srf) and not doubt
+    return long_enough and verdict.would_have_shown(c, srf) and not in_doubt
 
 
 @kernel
@@ -220,7 +240,8 @@ def update_second(types, layout, t):
 
 @kernel
 def isolate_pitch(types, layout, t):
-    """Which surface of pitch is at fault, if any."""
+    """Update which surfaces of pitch are at fault, at t s: the only one, or both after a second fault has
+    begun."""
     begin_second_if_shown(types, layout)
     if has_second(types):
         update_second(types, layout, t)
@@ -236,7 +257,8 @@ def isolate_pitch(types, layout, t):
 
 @kernel
 def sole_pitch(types, layout):
-    """The surface of pitch at fault if a constant explains everything on it, or NO_SURFACE."""
+    """The surface of pitch at fault if a constant type explains everything on it, or NO_SURFACE; its sets are
+    stored once varying types are dismissed."""
     s = verdict.find_surface(types, layout) if types.pair.group_alarm[PITCH_GROUP] else NO_SURFACE
     if s < 0 or not constant_remains(types.surface[s]):
         return NO_SURFACE
@@ -247,9 +269,8 @@ def sole_pitch(types, layout):
 
 @kernel
 def decide_pairs(types, past, layout, t):
-    """Name surfaces and types plane by plane; t s. Returns the finding on the one named first, for
-    `conclusion.record_decision`.
-    """
+    """Isolate surfaces and types plane by plane, at t s. Returns the finding on the surface that was isolated
+    first, for `conclusion.record_decision`; if there is none, that of UNANTICIPATED or NOT_ISOLATED."""
     outside = isolate_lateral(types, layout, t)
     isolate_pitch(types, layout, t)
     first, earliest_s = NO_SURFACE, np.inf

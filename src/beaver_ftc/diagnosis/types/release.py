@@ -1,27 +1,33 @@
 """Types that hold a surface somewhere, and let it go: does the judged frame agree with either?
 
-A repaired surface returns from where it was held, by lag and rate limit of its actuator: for a while it is
-neither at fault nor where a healthy one would be. The actuator's step a' = f(a) is known and rises with a, so
-the set of positions a that a past release can have led to is an interval; its ends are advanced exactly. A
-type that no longer holds the surface is excluded only if no such return explains the frame either.
+*Return.* A repaired surface returns from where it was held, by lag and rate limit of its actuator: for a
+while it is neither at fault nor where a healthy one would be. The step of the actuator p <- f(p) is known and
+rises with p. So the positions that past releases can have led to form an interval, whose ends are advanced
+exactly. A type that no longer holds the surface is excluded only if no such return explains the frame either.
 
-There are two such intervals, of earlier and of later releases. Nothing is observed before the alarm, so a
-release may have happened before it; each frame in which something is wrong excludes some releases. After a
+*Two intervals.* There is one of earlier and one of later releases. Nothing is observed before the alarm, so a
+release may have happened before it. Each frame in which something is wrong excludes some releases. After a
 release a type does not hold the surface again until the surface has been observed healthy. In a block of
 frames the release may happen at any instant of the block: at each instant the surface is where it was held,
 or where the actuator has moved it from there.
 
-A frame shows the mean of a moving position a, weighted by the effectiveness G at each instant. This mean
-differs from the plain mean by the covariance of G and a, over the mean of G, so by no more than
+*Mean of a frame.* A frame shows the mean of a moving position p, weighted by the effectiveness G at each
+instant. This mean differs from the plain mean by the covariance of G and p, over the mean of G, so by no more
+than
 
-    (G_max - G_min) / (4 |mean G|)  (a_max - a_min)                                        [Gruess1935]
+    kappa (p_max - p_min),    kappa = (G_max - G_min) / (4 |mean G|)                       [Gruess1935]
 
-Where the parameter is the position itself (stuck), conclusions about it are not certain if the surface may
-already have been returning after a repair. So its set before the earliest return still possible is kept, and
-is restored when the surface looks healthy.
+*Sets.* Where the parameter is the position itself (stuck), conclusions about it are not certain if the
+surface may already have been returning after a repair. So its set before the earliest return still possible
+is kept, and is restored when the surface looks healthy.
 
-b: slot of releases, EARLIER or LATER; rel: record of the releases (records.RELEASE_RECORD); lo, hi: where a
-type holds the surface, rad. Symbols: types/__init__.py.
+    b           slot of releases, EARLIER or LATER
+    rel         record of the releases (records.RELEASE_RECORD)
+    lo, hi      rad, interval of positions: where a type holds the surface, or where returns begin in a frame
+    low, high   rad, means over the frame of the returns that begin at lo and at hi
+
+In a frame, examination.judge_frame calls `begin_release`, then `held_set` if the frame is judged, then
+`advance_returns`. Other symbols: types/__init__.py.
 """
 
 import numpy as np
@@ -38,25 +44,26 @@ HEALTHY_RAD = 1e-14
 
 @kernel
 def set_return(rel, b, h, lo, hi):
-    """Replace the interval of the positions of a return, rad; rounding may have swapped ends that meet."""
+    """Replace the interval of the positions of returns in slot b, rad. min and max are there because rounding
+    may swap ends that meet."""
     rel.back_lo[b, h], rel.back_hi[b, h] = min(lo, hi), max(lo, hi)
 
 
 @kernel
 def forget_return(rel, b, h):
-    """No release of this type is possible: the empty interval."""
+    """Make the interval of slot b empty: no release of this type is possible."""
     rel.back_lo[b, h], rel.back_hi[b, h] = EMPTY_SET
 
 
 @kernel
 def may_return(rel, b, h):
-    """Whether a release of this type is possible."""
+    """Whether a release of this type in slot b is possible."""
     return rel.back_lo[b, h] <= rel.back_hi[b, h]
 
 
 @kernel
 def allow_before(srf, h):
-    """Allow a release before the alarm, from anywhere in the travel."""
+    """Allow a release before the alarm, from anywhere in the travel, in the slot LATER."""
     rel = srf.release
     forget_return(rel, EARLIER, h)
     set_return(rel, LATER, h, srf.actuator.stop_lo, srf.actuator.stop_hi)
@@ -66,17 +73,19 @@ def allow_before(srf, h):
 
 @kernel
 def is_position(srf, h):
-    """Whether the parameter of a type is the position at which it holds the surface."""
+    """Whether the parameter of a type is the position at which it holds the surface: of the types that hold a
+    surface, only such a type limits its set (`parameter_range`)."""
     return srf.sets.low[h] > -np.inf
 
 
 @kernel
 def simulate_return(c, srf, p0, end, anywhere=False):
-    """Mean of p over the judged frame of a surface released at p0 (rad), p at the end of the frame, and
-    kappa times the range of p, by which the mean may be off.
+    """Simulate the judged frame of a surface released at p0 rad. Returns, in rad, the mean of p over the
+    frame, p at its end, and kappa (p_max - p_min), by which the mean may be off.
 
-    p <- f(p), f a step of the actuator towards u: of those declared the one that takes it farthest to one
-    side, end 1 or -1. The release is at the beginning of the frame, or `anywhere` in it, where p is farthest.
+    p <- f(p): one step of the actuator towards u; of the declared actuators, the one that takes the surface
+    farthest to one side, end 1 (up) or -1 (down). The release is at the beginning of the frame. If it may be
+    `anywhere` in it, p0 is at every step a possible position, too: p <- max(p, p0) for end 1, min for end -1.
     """
     act = srf.actuator
     total, p, p_min, p_max = 0.0, p0, p0, p0
@@ -93,8 +102,9 @@ def simulate_return(c, srf, p0, end, anywhere=False):
 
 @kernel
 def simulate_ends(c, srf, lo, hi, anywhere=False):
-    """`simulate_return` from both ends of an interval (lo, hi) rad, as far as it can go to that side: the
-    means, by how much each may be off, the positions at the end of the frame; each (of lo, of hi), rad."""
+    """`simulate_return` from both ends of an interval (lo, hi) rad, each as far as it can go to its side.
+    Returns three pairs (of lo, of hi), rad: the means, by how much each may be off, and the positions at the
+    end of the frame."""
     low, lo, tol_low = simulate_return(c, srf, lo, -1.0, anywhere)
     high, hi, tol_high = simulate_return(c, srf, hi, 1.0, anywhere)
     return (low, high), (tol_low, tol_high), (lo, hi)
@@ -102,7 +112,8 @@ def simulate_ends(c, srf, lo, hi, anywhere=False):
 
 @kernel
 def release_explains(c, srf, h):
-    """Whether a release at an instant of the judged block explains the block."""
+    """Whether a release at an instant of the judged block, from where the type held the surface by then
+    (held_lo, held_hi), explains the block."""
     lo, hi = srf.release.held_lo[h], srf.release.held_hi[h]
     if c.frames_per_block == 1 or lo > hi:
         return False
@@ -112,7 +123,7 @@ def release_explains(c, srf, h):
 
 @kernel
 def keep_returns(c, srf, h):
-    """Whether a return after this type explains the judged frame; forget the releases that do not."""
+    """Whether a return from this type explains the judged frame. Forget the releases whose returns do not."""
     rel = srf.release
     explained = release_explains(c, srf, h)
     if not explained:
@@ -128,10 +139,13 @@ def keep_returns(c, srf, h):
 
 @kernel
 def narrow_return(c, srf, b, h):
-    """Whether the judged frame agrees with a return; drop the part of its interval that does not.
+    """Whether the judged frame agrees with some return in slot b; cut off the part of its interval that does
+    not:
 
-    The mean over the frame rises with where the return began, and by no more than that, if the actuator is
-    known. low, high: means of the returns from the ends of the interval.
+        lo <- lo + max(seen.lo - low - tol, 0),    hi <- hi - max(high - tol - seen.hi, 0)
+
+    This is valid because the mean over the frame rises with where the return began, and by no more than that,
+    if the actuator is known. A return that has ended by now (`healthy`) explains nothing wrong.
     """
     seen, lo, hi = srf.judged, srf.release.back_lo[b, h], srf.release.back_hi[b, h]
     (low, high), tols, _ = simulate_ends(c, srf, lo, hi)
@@ -146,9 +160,14 @@ def narrow_return(c, srf, b, h):
 
 @kernel
 def held_set(c, srf, h, lo, hi):
-    """The parameters that explain the judged frame: all if the type holds the surface there, those of the
-    frame if the parameter is the position; all if it has released the surface, and the actuator may be
-    bringing it back; else none.
+    """The parameters of type h that explain the judged frame, where it holds the surface in (lo, hi) rad:
+
+        holds it, and the frame meets (lo, hi)       all, or the positions of the frame if `is_position`
+        otherwise, and a return explains the frame   all; from now on the surface is released
+        otherwise                                    none
+
+    A type holds the surface until it has released it. The returns are tested in any case, because those that
+    do not explain the frame must be forgotten.
     """
     returns = c.returns_lagged and keep_returns(c, srf, h)
     released, seen = srf.release.released, srf.judged
@@ -162,11 +181,13 @@ def held_set(c, srf, h, lo, hi):
 
 @kernel
 def begin_release(c, srf, h, lo, hi, stop):
-    """A repair may have released the surface as the judged frame began; with several JSBSim frames in one of
-    ours within the frame before, further towards the stop (1 upper, -1 lower) to which the type runs.
+    """Add to the later releases one that may have happened as the judged frame began, or within the frame
+    before, if a frame has several instants. It begins where the type held the surface, (lo, hi), and where
+    the surface was seen. Within a frame the surface may have been further towards the stop (1 upper, -1
+    lower) to which the type runs, so that this end is not narrowed by what was seen.
 
-    A known position is that of the earlier releases: when none is possible any more, the later ones are
-    earlier.
+    If the parameter is the position, and no earlier release is possible any more, the later ones become the
+    earlier ones.
     """
     rel, seen = srf.release, srf.judged if c.single_instant else srf.earlier
     if is_position(srf, h) and not may_return(rel, EARLIER, h):
@@ -193,8 +214,9 @@ def widen_later(rel, h, lo, hi):
 
 @kernel
 def advance_returns(c, srf, h):
-    """Carry the intervals of returns to the next frame; a surface that looks healthy may be held again, where
-    it can have been before the earliest return still possible.
+    """Carry the intervals of returns to the end of the judged frame. A surface that looks healthy in it may
+    be held again; its set is then that from before the earliest return still possible. Hence the order of the
+    slots: what EARLIER puts replaces what LATER has put.
     """
     rel = srf.release
     for b in (LATER, EARLIER):

@@ -1,7 +1,7 @@
 """Outer loops: altitude, airspeed, heading and bank by body rates and engine power.
 
 The autopilot computes where each channel of the commanded profile should be now, from the legs of the
-scenario, and body-rate references and an engine setting for that.
+scenario. From this it computes body-rate references, which the law follows, and an engine setting.
 
     altitude  gamma_c = (H_c' + K (H_c - H)) / V + M                              `path_angle_to_fly`
     pitch     theta_c' = K (theta_c - theta),  theta_c = gamma_c + alpha cos phi  `pitch_attitude_rate`
@@ -12,19 +12,26 @@ scenario, and body-rate references and an engine setting for that.
     turn      psi' = g tan phi / V: coordinated [Etkin1996, sec. 7.6]             `set_body_rates`
 
     H, V           m, m/s    altitude; airspeed, smoothed
-    gamma, alpha   rad       path angle; incidence, smoothed
+    gamma, alpha   rad       path angle; angle of attack, smoothed
     theta, phi     rad       pitch attitude, bank
     psi            rad       heading
     A, g           m/s2      acceleration along the path, by engine power; gravity
-    K              1/s       gain of the loop
-    M                        found missing: the integral of the loop's error, in the unit of the sum it is in
+    K, K_i         1/s, 1/s2 gain of the loop; gain of its integral
+    M                        integral of the loop's error (`missing_...`), in the unit of the sum it is in
+    ..._c, '                 commanded; rate of change
 
-Every demand is limited, and what a limit cut off is not integrated. The limits on rates and bank shrink with
-what the surfaces that are left can give; climb and descent are bounded by the power there is, so that the
-airspeed is kept. Where the ailerons no longer act, the roll is flown by sideslip: rudder and dihedral.
+Each demand is limited. While a limit cuts a demand off, its error is not integrated. The limits on rates and
+bank shrink with the remaining authority of the surfaces. The power that there is bounds climb and descent, so
+that the airspeed is kept. Where the ailerons no longer act, the roll is flown by sideslip: rudder and
+dihedral.
 
-The airspeed to fly is the commanded one, as far as it can be held (envelope_protection.py). The record is
-filled by autopilot_setup.py; profile.py has the commands.
+The airspeed to fly is the commanded one, as far as it can be held (envelope_protection.py).
+autopilot_setup.py fills the record; profile.py has the commands.
+
+    power      setting of the engine, in its own unit (inHg of a piston engine)
+    push       acceleration along the path per unit of power, m/s2 (thrust.py)
+    y          measured signals (design/table.py)
+    attitude   (3,) rad, roll, pitch and yaw angle
 """
 
 import numpy as np
@@ -48,83 +55,96 @@ from beaver_ftc.control.thrust import ENGINE, gained, look_up, power_for, thrust
 from beaver_ftc.design.table import AIRSPEED, ALPHA, BETA
 from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
 
-# K of each loop, 1/s, and of its integral M, `_i`, 1/s2; smoothing, s; and what bounds the demands.
-# Attitudes a fifth as fast as the inner loops, the path a quarter of that: gusts set the gains, not comfort.
+# Gains of the loops: K, 1/s, and K_i, 1/s2, whose name ends with `_i`; times, s; and bounds of the demands.
+# The attitude loops are a fifth as fast as the inner loops, and the path loop is a quarter as fast as these.
+# Gusts set the gains, not comfort.
 GAINS = {
     "altitude": 0.8, "altitude_i": 0.04, "attitude": 3.0, "speed": 0.3, "speed_i": 0.015,
     "bank": 1.0, "bank_i": 0.2, "heading": 0.25, "heading_i": 0.004,
-    "sideslip": 0.5,  # the yaw damper's part beside the rate loop
-    "alpha_s": 2.0, "airspeed_s": 3.0,  # against noise and gusts
-    "jammed_s": 1.0,  # rolling is handed to the rudder within about so long
-    "authority_s": 1.0,  # a rate is asked for only if it can be had, and ended, within this time
-    "bank_s": 6.0,  # and a bank only if it can be left within this time
-    "spare_mps": 2.0, "path_per_mps": 0.02,  # airspeed off before height goes for it, and how much path, rad
-    "loose": 0.4,  # share of the heading loop left when nothing acts in yaw: the turn is then slow to follow
+    "sideslip": 0.5,  # 1/s, of the yaw damper: yaw rate per sideslip
+    "alpha_s": 2.0, "airspeed_s": 3.0,  # s, smoothing against noise and gusts
+    "jammed_s": 1.0,  # s, time constant with which rolling is handed to the rudder
+    "authority_s": 1.0,  # s: a rate is demanded only if it can be reached, and ended, within this time
+    "bank_s": 6.0,  # s: a bank is demanded only if it can be left within this time
+    "spare_mps": 2.0,  # m/s: with more error of the airspeed, the path gives way
+    "path_per_mps": 0.02,  # rad per m/s: how much it gives way
+    "loose": 0.4,  # factor on the heading loop when nothing acts in yaw: the turn then follows slowly
     "protection": 2.0,  # 1/s: how fast the angle of attack may close on its limit
 }  # fmt: skip
 GAIN = record(**dict.fromkeys(GAINS, float))
 
 AUTOPILOT = record(
-    enabled=int, flying=int, dt=float,
-    # profile: legs in SI and rad. A value that is not a number holds what is.
+    enabled=int,  # whether the scenario has a profile
+    flying=int,  # whether the autopilot has taken over
+    dt=float,  # s, length of a frame
+    # Profile (profile.py), in SI and rad, by channel: its legs. A leg whose value is NaN keeps the command.
     n_legs=(int, N_CHANNELS), next_leg_index=(int, N_CHANNELS),
     leg_starts_at_s=(N_CHANNELS, MAX_LEGS), leg_value=(N_CHANNELS, MAX_LEGS),
     leg_max_command_rate=(N_CHANNELS, MAX_LEGS),
-    is_commanded=(int, N_CHANNELS),  # whether the channel is flown by now
+    is_commanded=(int, N_CHANNELS),  # whether a leg has begun, so that the channel is flown
+    # the value to which the leg takes the command; the command now; its largest rate, per second
     goal=N_CHANNELS, command=N_CHANNELS, max_command_rate=N_CHANNELS,
-    command_rate=N_CHANNELS,  # per second, of the command at this instant
-    changed_at_s=N_CHANNELS,
-    # what is known of the aircraft
-    gravity=float, thrust=2,  # m/s2 per dpt and Pa: at no alpha, and per alpha
-    engine=ENGINE, pitch_holds_airspeed=int,  # what else is known of it; whether pitch holds the airspeed
-    trim_power=float, low_power=float, high_power=float,  # in the units of its setting
-    climb_in_trim=float,  # rad, with the engine as trimmed
-    dihedral=float,  # roll rate per sideslip and airspeed, 1/m
-    full_power=float, allowed_power=float,  # the highest there is now, and that the rudder allows
+    command_rate=N_CHANNELS,  # rate of the command now, per second
+    changed_at_s=N_CHANNELS,  # when a leg last changed the goal
+    # Aircraft and engine
+    gravity=float,  # m/s2
+    thrust=2,  # acceleration by dpt, and by dpt^2 per rad of alpha, over qdyn, m/s2 per Pa
+    engine=ENGINE,  # table of thrust, where the slipstream does not give it
+    pitch_holds_airspeed=int,  # whether pitch, and not power, holds the airspeed
+    trim_power=float, low_power=float, high_power=float,  # setting in trim, and its range
+    climb_in_trim=float,  # gamma_trim, rad, with the engine as trimmed
+    dihedral=float,  # 1/m: roll rate per rad of sideslip and m/s of airspeed
+    full_power=float, allowed_power=float,  # the highest setting now; the highest that the rudder allows
     dpt_cubed_held_by_sideslip=float,  # dpt^3 whose yawing moment the largest accepted sideslip holds
-    slowest_mps=float, steepest_alpha=float,
-    max_healthy_rate=3,  # rad/s, of the rates asked for with all surfaces healthy
-    rate_limit=3, max_healthy_bank=float, bank_limit=float,
-    # memory
+    slowest_mps=float, steepest_alpha=float,  # least airspeed, m/s, and largest angle of attack, rad, to fly
+    max_healthy_rate=3, rate_limit=3,  # largest p, q, r to demand, rad/s: with all surfaces healthy, and now
+    max_healthy_bank=float, bank_limit=float,  # largest bank to demand, rad: the same
+    # Memory
     alpha=float, airspeed=float,  # smoothed, rad and m/s
     recent_airspeed_mps=float,  # averaged over RECENT_AIRSPEED_S
-    missing_turn_rate=float,  # rad/s of turning found missing
-    missing_path_angle=float,  # rad of path angle found missing
-    missing_acceleration=float, missing_roll_rate=float,  # m/s2, rad/s: found missing
-    roll_loss_share=float,  # share of roll that rudder and dihedral carry
-    yaw_loss_share=float,  # 1: nothing acts in yaw
-    engines_alone_yaw_share=float,  # share of the time of late in which engines alone act there
-    rates=3, gain=GAIN,
-    sets_power=int, power_setting=float,  # whether the engine is set by now, and to what
+    # integrals M: rad/s of turn rate, rad of path angle, m/s2 along the path, rad/s of bank rate
+    missing_turn_rate=float, missing_path_angle=float, missing_acceleration=float, missing_roll_rate=float,
+    roll_loss_share=float,  # share of roll that rudder and dihedral carry, 0 to 1
+    yaw_loss_share=float,  # 1: no surface acts in yaw; moves smoothly between 0 and 1
+    engines_alone_yaw_share=float,  # share of the last BY_POWER_S in which engines alone act in yaw
+    # Output
+    rates=3,  # p, q, r to fly, rad/s
+    gain=GAIN,
+    sets_power=int, power_setting=float,  # whether the autopilot sets the engine now, and to what
     power_airspeed=float,  # m/s, to hold while power stands in for a lost pitch
-    airspeed_to_fly=float, airspeed_to_fly_rate=float,  # m/s, and its change, m/s2
+    airspeed_to_fly=float, airspeed_to_fly_rate=float,  # m/s; its rate of change, m/s2
     holding=HOLDING,
-    # deviations: the mean of late and the largest, from what is commanded and, airspeed, from what is held;
-    # `largest_deviation` is NOT_JUDGED until a channel is: of angles that takes SETTLED_S
+    # Deviations: averaged over MEAN_S, and the largest so far; from the command and, for the airspeed, also
+    # from the airspeed to fly. `largest_deviation` is NOT_JUDGED until the channel counts (profile.py).
     mean_deviation=N_CHANNELS, mean_deviation_from_airspeed_to_fly=float,
     largest_deviation_from_airspeed_to_fly=float, largest_deviation=N_CHANNELS,
     largest_instant_airspeed_deviation=float,  # m/s, of the airspeed from what is commanded, at one instant
 )  # fmt: skip
 
-MOST_PATH_RAD = 0.15
-MOST_SIDESLIP_RAD = 0.14
-LEAST_COS_BANK = 0.1  # where the turn rate divides: 84 deg, beyond any bank that is asked for
+MOST_PATH_RAD = 0.15  # steepest climb or descent to demand
+MOST_SIDESLIP_RAD = 0.14  # largest sideslip to demand, in order to roll by it
+LEAST_COS_BANK = 0.1  # least divisor of the turn rate: 84 deg, beyond any bank that is demanded
 MOST_MISSING = 0.1  # largest M of the path angle, rad, and, times gravity, of the acceleration
 MOST_DRIFT_RAD_S = 0.1  # largest M of the turn rate: a bank that is held without a turn
 RECENT_AIRSPEED_S = 20.0  # time constant with which the recent airspeed is averaged
-MAX_FROM_RECENT_MPS = 3.0  # power alone can hold an airspeed within so much of the recent one
-CUT_INHG_S, RAISE_INHG_S = 8.0, 1.0  # about as fast as the engine follows; and slower than a gust lasts
-BANK_LOST_WITH_ROLL, BANK_LOST_WITH_YAW = 0.5, 0.2  # shares of the bank limit without ailerons, rudder
-KEPT_ASIDE = 0.15  # of the power's range at either end, for engines that alone yaw the aircraft
-LOOP_GAIN_SHARE_BY_POWER = 0.25  # of the loops of bank and heading where engines alone yaw the aircraft
+MAX_FROM_RECENT_MPS = 3.0  # power alone can hold an airspeed within this distance of the recent one
+# Rates at which the allowed power falls, about as fast as the engine follows, and rises, slower than a gust
+# lasts.
+CUT_INHG_S, RAISE_INHG_S = 8.0, 1.0
+BANK_LOST_WITH_ROLL, BANK_LOST_WITH_YAW = 0.5, 0.2  # shares of the bank limit lost without ailerons, rudder
+KEPT_ASIDE = 0.15  # share of the power's range, at either end, for engines that alone yaw the aircraft
+LOOP_GAIN_SHARE_BY_POWER = 0.25  # factor on the bank and heading loops where engines alone yaw the aircraft
 BY_POWER_S = 5.0  # time constant of the share of the time in which engines alone yaw the aircraft
 
 
 @kernel
 def steer(autopilot, control, u, measured, unexplained, t):
     """One frame, at t s: fill autopilot.rates (3,) rad/s, and the engine setting where an airspeed is
-    commanded. control: the records of the law (control/state.py). u, unexplained: see
-    `limit_airspeed_to_fly`. path, rolling, pitching: gamma_c rad; phi_c', theta_c' rad/s.
+    commanded and power holds it.
+
+    control: the records of the law (control/state.py). u, unexplained: see `limit_airspeed_to_fly`. path:
+    gamma_c, rad; rolling, pitching: phi_c', theta_c', rad/s. The order matters: each step reads the limits of
+    the steps before.
     """
     layout, surfaces, saturated = control.layout, control.surfaces, control.allocation.output.saturated
     axes, power, by_engines = control.axes, control.power, control.engines.output.authority
@@ -150,7 +170,7 @@ def steer(autopilot, control, u, measured, unexplained, t):
 
 @kernel
 def take_over(autopilot, y, attitude):
-    """In trim: smoothed signals and the engine as they are."""
+    """Take over in trim: the smoothed signals begin as measured, and the path angle is gamma_trim."""
     autopilot.flying = 1
     autopilot.alpha = y[ALPHA]
     autopilot.airspeed = autopilot.recent_airspeed_mps = y[AIRSPEED]
@@ -158,63 +178,76 @@ def take_over(autopilot, y, attitude):
 
 
 def forget_losses(autopilot: np.void) -> None:
-    """Forget which surfaces are gone, what that left missing, and which airspeeds can be held then: the law
-    that takes over from an oracle is not told it."""
-    for loss in ("roll_loss_share", "yaw_loss_share", "engines_alone_yaw_share"):
-        autopilot[loss] = 0.0
+    """Forget which surfaces are lost, the integrals that follow from the losses, and the airspeeds that can
+    be held with them: a law that takes over from an oracle must not receive the truth."""
+    for share in ("roll_loss_share", "yaw_loss_share", "engines_alone_yaw_share"):
+        autopilot[share] = 0.0
     autopilot["missing_roll_rate"] = autopilot["missing_turn_rate"] = 0.0
-    for held in ("n_averaged_frames", "limits_airspeed", "mean_acting_elevator", "mean_commanded_elevator"):
-        autopilot["holding"][held] = 0
+    for field in ("n_averaged_frames", "limits_airspeed", "mean_acting_elevator", "mean_commanded_elevator"):
+        autopilot["holding"][field] = 0
 
 
 @kernel
 def smooth_signals_and_losses(autopilot, layout, surfaces, saturated, engines_yaw, y):
-    """Smooth what is noisy, and note whether the ailerons or the rudder are gone; ailerons at their stop give
-    no more roll, whatever their estimated effectiveness. engines_yaw: whether engines can yaw the
-    aircraft."""
+    """Smooth angle of attack and airspeed, and the shares of roll and yaw that are lost:
+
+        x <- x + dt / tau (signal - x)
+
+        x                          signal                                               tau, s
+        alpha, airspeed            y                                                    alpha_s, airspeed_s
+        roll_loss_share            1 if less than `least` of roll remains, or the       jammed_s
+                                   main surface of roll is at its stop
+        yaw_loss_share             1 if less than `least` of yaw remains                jammed_s
+        engines_alone_yaw_share    1 if yaw is lost or its main surface at its stop     BY_POWER_S
+
+    At its stop a surface gives no more, whatever its estimated effectiveness. engines_yaw: whether engines
+    can yaw the aircraft; the last share stays if not.
+    """
     dt, gain = autopilot.dt, autopilot.gain
     least = surfaces.config.least_effectiveness
     effectiveness = surfaces.output.effectiveness
     autopilot.alpha += dt / gain.alpha_s * (y[ALPHA] - autopilot.alpha)
     autopilot.airspeed += dt / gain.airspeed_s * (y[AIRSPEED] - autopilot.airspeed)
     at_stop = saturated[layout.main[ROLL]] == 1
-    gone = remaining(layout, effectiveness, ROLL) < least or at_stop
-    autopilot.roll_loss_share += dt / gain.jammed_s * (gone - autopilot.roll_loss_share)
-    free = remaining(layout, effectiveness, YAW) < least
-    autopilot.yaw_loss_share += dt / gain.jammed_s * (free - autopilot.yaw_loss_share)
+    roll_lost = remaining(layout, effectiveness, ROLL) < least or at_stop
+    autopilot.roll_loss_share += dt / gain.jammed_s * (roll_lost - autopilot.roll_loss_share)
+    yaw_lost = remaining(layout, effectiveness, YAW) < least
+    autopilot.yaw_loss_share += dt / gain.jammed_s * (yaw_lost - autopilot.yaw_loss_share)
     if engines_yaw:
-        by_power = free or saturated[layout.main[YAW]] == 1
+        by_power = yaw_lost or saturated[layout.main[YAW]] == 1
         autopilot.engines_alone_yaw_share += dt / BY_POWER_S * (by_power - autopilot.engines_alone_yaw_share)
 
 
 @kernel
 def limit_rates_and_bank(autopilot, layout, G, hold, engine_authority):
-    """Rates (rad/s) and bank (rad) that the surfaces left can give: their spare acceleration for a while.
+    """Limit the rates (rad/s) and the bank (rad) to those that the spare acceleration of the surfaces can
+    reach, and end, within a time:
 
         rate_i = min(max_healthy_rate_i, authority_s spare_i)
-        spare_i = min(greatest_i - hold_i, hold_i - least_i)
+        spare_i = max(min(greatest_i - hold_i, hold_i - least_i), 0)
         rate_roll >= roll_loss_share dihedral V MOST_SIDESLIP_RAD           by sideslip
-        bank = min(max_healthy_bank (1 - less), bank_s rate_roll)           less: the greater share lost
+        bank = min(max_healthy_bank (1 - lost), bank_s rate_roll)
+        lost = max(BANK_LOST_WITH_ROLL roll_loss_share, BANK_LOST_WITH_YAW yaw_loss_share)
 
     G (3, n): with the effectiveness of each in it; hold (3,) rad/s2; least, greatest, engine_authority: as in
     `allocation.attainable`.
     """
-    rate, gain, rolls_less = autopilot.rate_limit, autopilot.gain, autopilot.roll_loss_share
+    rate, gain, roll_loss = autopilot.rate_limit, autopilot.gain, autopilot.roll_loss_share
     for i in range(3):
         least, greatest = attainable(G, layout, engine_authority, i)
         spare = max(min(greatest - hold[i], hold[i] - least), 0.0)
         rate[i] = min(autopilot.max_healthy_rate[i], spare * gain.authority_s)
-    by_sideslip = rolls_less * autopilot.dihedral * autopilot.airspeed * MOST_SIDESLIP_RAD
+    by_sideslip = roll_loss * autopilot.dihedral * autopilot.airspeed * MOST_SIDESLIP_RAD
     rate[ROLL] = max(rate[ROLL], by_sideslip)
-    less = max(BANK_LOST_WITH_ROLL * rolls_less, BANK_LOST_WITH_YAW * autopilot.yaw_loss_share)
-    steepest = autopilot.max_healthy_bank * (1.0 - less)
+    lost = max(BANK_LOST_WITH_ROLL * roll_loss, BANK_LOST_WITH_YAW * autopilot.yaw_loss_share)
+    steepest = autopilot.max_healthy_bank * (1.0 - lost)
     autopilot.bank_limit = min(steepest, rate[ROLL] * gain.bank_s)
 
 
 @kernel
 def acceleration_per_power(autopilot, power, y):
-    """Acceleration along the path per unit of power, m/s2, where no table has it; the table's are brought to
-    this airspeed."""
+    """The push, m/s2 per unit of power. An engine with a table of thrust needs none: its table is brought to
+    this airspeed, and the push is 0."""
     if autopilot.engine.settings:
         look_up(autopilot.engine, autopilot.airspeed)
         return 0.0
@@ -223,8 +256,9 @@ def acceleration_per_power(autopilot, power, y):
 
 @kernel
 def change_allowed_power(autopilot, power, at_stop, y):
-    """A rudder at its stop holds no more, whatever its estimate: reduce the power allowed until it comes
-    off, and then raise it again. at_stop: whether it is there; y (n_y,)."""
+    """Reduce the allowed power, by CUT_INHG_S, while the rudder is at its stop (at_stop): it can hold no more
+    yawing moment of the propeller then, whatever its estimated effectiveness. Then raise it again, by
+    RAISE_INHG_S. It never falls below the power whose yawing moment sideslip alone holds."""
     high = autopilot.high_power
     if at_stop:
         lowest = ceiling(power, y, autopilot.dpt_cubed_held_by_sideslip ** (1.0 / 3.0))
@@ -236,13 +270,12 @@ def change_allowed_power(autopilot, power, at_stop, y):
 
 @kernel
 def highest_power(autopilot, power, left, y):
-    """The highest power with what is left of the rudder: the Beaver's propeller yaws with dpt^3.
-
-    What the rudder lacks, sideslip makes up for. The slower, the less: a climb beyond it ends in slow flight.
+    """The highest setting with the remaining effectiveness `left` of the rudder: the propeller of the Beaver
+    yaws the aircraft with dpt^3, and what the rudder lacks, sideslip makes up for.
 
         dpt^3 held = left highest_dpt^3 + (1 - left) dpt_cubed_held_by_sideslip
 
-    left: effectiveness of the rudder; y (n_y,).
+    The slower the flight, the lower is this power. A climb with more power would end in slow flight.
     """
     if left >= 1.0:
         return autopilot.allowed_power
@@ -252,11 +285,11 @@ def highest_power(autopilot, power, left, y):
 
 @kernel
 def path_angle_to_fly(autopilot, measured, push):
-    """gamma_c, path angle to fly, rad; the one that is flown where no altitude is commanded.
+    """gamma_c, path angle to fly, rad. Where no altitude is commanded, it is the present one.
 
         gamma_c = (H_c' + K (H_c - H)) / V + M,    M <- M + dt K_i (H_c - H) / V        unless limited
 
-    M: missing_path_angle. push: as in thrust.py.
+    M: missing_path_angle. Where pitch holds the airspeed: see `glide_path_angle`.
     """
     if autopilot.pitch_holds_airspeed and autopilot.is_commanded[SPEED]:
         return glide_path_angle(autopilot)
@@ -290,20 +323,23 @@ def glide_path_angle(autopilot):
 
 @kernel
 def integrate_missing_acceleration(autopilot, error):
-    """M <- M + dt K_i error: the acceleration, m/s2, that an airspeed takes in addition to the computed one;
-    error m/s."""
-    found = autopilot.missing_acceleration + autopilot.dt * autopilot.gain.speed_i * error
-    autopilot.missing_acceleration = clamp(found, MOST_MISSING * autopilot.gravity)
+    """M <- M + dt K_i error, within +- MOST_MISSING g: the acceleration, m/s2, that an airspeed takes in
+    addition to the computed one; error m/s."""
+    missing = autopilot.missing_acceleration + autopilot.dt * autopilot.gain.speed_i * error
+    autopilot.missing_acceleration = clamp(missing, MOST_MISSING * autopilot.gravity)
 
 
 @kernel
 def path_angle_limits(autopilot, push):
-    """The steepest descent and climb, rad: what the engine sustains, and what airspeed there is to spare.
+    """The steepest descent and climb, rad: those that the engine sustains, and a share for the airspeed that
+    there is to spare:
 
-        low = gamma_trim + gained(idle) / g - path_per_mps (fast - V)
-        high = gamma_trim + gained(full) / g + path_per_mps (V - slow)
+        low = gamma_trim + gained(idle) / g - path_per_mps (fast - V)       at least -MOST_PATH_RAD
+        high = gamma_trim + gained(full) / g + path_per_mps (V - slow)      within +- MOST_PATH_RAD
 
-    slow, fast: the airspeeds, m/s, at which height no longer goes before airspeed; gained: thrust.py, m/s2.
+    slow, fast: the airspeeds, m/s, at which nothing is to spare: spare_mps below and above the airspeed to
+    fly, and slow at least slowest_mps. Without a commanded airspeed the engine stays as trimmed, slow is
+    slowest_mps, and low is -MOST_PATH_RAD. gained: thrust.py, m/s2.
     """
     gain = autopilot.gain
     slow = autopilot.slowest_mps
@@ -322,8 +358,9 @@ def path_angle_limits(autopilot, push):
 
 @kernel
 def pitch_attitude_rate(autopilot, y, attitude, path):
-    """theta_c' = K (theta_c - theta), the rate of the pitch attitude, rad/s: within its limit, and no more
-    than `protection` times the incidence left below its limit. theta_c = path + alpha cos phi."""
+    """theta_c' = K (theta_c - theta), the rate of the pitch attitude, rad/s, with theta_c = path + alpha cos
+    phi: within its limit, and at most `protection` times (steepest_alpha - angle of attack). 0 if neither an
+    altitude nor a glide is flown."""
     glides = autopilot.pitch_holds_airspeed and autopilot.is_commanded[SPEED]
     if not (autopilot.is_commanded[ALTITUDE] or glides):
         return 0.0
@@ -334,8 +371,13 @@ def pitch_attitude_rate(autopilot, y, attitude, path):
 
 @kernel
 def bank_angle_rate(autopilot, attitude):
-    """phi_c' = share K (phi_c - phi) + roll_loss M, the rate of the bank angle, rad/s; slower where engines
-    alone yaw and roll. M: missing_roll_rate, rad/s, integrated as far as ailerons are lost."""
+    """phi_c' = share K (phi_c - phi) + roll_loss M, the rate of the bank angle, rad/s:
+
+        share = 1 - roll_loss engines_alone_yaw_share (1 - LOOP_GAIN_SHARE_BY_POWER)
+        M <- M + roll_loss dt share K_i (phi_c - phi)        unless limited
+
+    The loop is slower where engines alone yaw and roll the aircraft. M: missing_roll_rate, rad/s.
+    """
     gain, roll_loss = autopilot.gain, autopilot.roll_loss_share
     share = 1.0 - roll_loss * autopilot.engines_alone_yaw_share * (1.0 - LOOP_GAIN_SHARE_BY_POWER)
     if autopilot.is_commanded[HEADING]:
@@ -344,25 +386,30 @@ def bank_angle_rate(autopilot, attitude):
         bank = autopilot.command[BANK]
     else:
         return 0.0
-    away = clamp(bank, autopilot.bank_limit) - attitude[ROLL]
-    wanted = share * gain.bank * away + roll_loss * autopilot.missing_roll_rate
+    error = clamp(bank, autopilot.bank_limit) - attitude[ROLL]
+    wanted = share * gain.bank * error + roll_loss * autopilot.missing_roll_rate
     rate = clamp(wanted, autopilot.rate_limit[ROLL])
     if rate == wanted:
-        autopilot.missing_roll_rate += roll_loss * autopilot.dt * share * gain.bank_i * away
+        autopilot.missing_roll_rate += roll_loss * autopilot.dt * share * gain.bank_i * error
     return rate
 
 
 @kernel
 def bank_to_turn(autopilot, share, heading):
-    """phi_c = V / g (psi_c' + share left K (psi_c - psi) + M), rad: bank of the coordinated turn to the
-    commanded heading. Where nothing acts in yaw, the loop is slower (left), and integrates what it misses: M,
-    missing_turn_rate, rad/s."""
+    """phi_c = V / g (psi_c' + share loose K (psi_c - psi) + M), rad: bank of the coordinated turn to the
+    commanded heading.
+
+        loose = 1 - yaw_loss (1 - gain.loose)
+        M <- yaw_loss (M + dt yaw_loss K_i (psi_c - psi))        M, missing_turn_rate, within MOST_DRIFT_RAD_S
+
+    So where nothing acts in yaw, the loop is slower, and integrates its error.
+    """
     gain, yaw_loss = autopilot.gain, autopilot.yaw_loss_share
     error = wrap_to_half_turn(autopilot.command[HEADING] - heading)
-    left = 1.0 - yaw_loss * (1.0 - gain.loose)
-    found = autopilot.missing_turn_rate + autopilot.dt * yaw_loss * gain.heading_i * error
-    autopilot.missing_turn_rate = yaw_loss * clamp(found, MOST_DRIFT_RAD_S)
-    turning = share * left * gain.heading * error + autopilot.command_rate[HEADING]
+    loose = 1.0 - yaw_loss * (1.0 - gain.loose)
+    missing = autopilot.missing_turn_rate + autopilot.dt * yaw_loss * gain.heading_i * error
+    autopilot.missing_turn_rate = yaw_loss * clamp(missing, MOST_DRIFT_RAD_S)
+    turning = share * loose * gain.heading * error + autopilot.command_rate[HEADING]
     return autopilot.airspeed / autopilot.gravity * (turning + autopilot.missing_turn_rate)
 
 
@@ -373,8 +420,9 @@ def set_body_rates(autopilot, y, attitude, rolling, pitching):
         p = phi' - psi' sin theta,    q = theta' cos phi + psi' cos theta sin phi
         r = psi' cos theta cos phi - theta' sin phi + K (beta - beta_c),    psi' = g tan phi / V
 
-    beta_c, rad: the sideslip that rolls the aircraft as far as ailerons are lost, -phi' / (dihedral V).
-    Without a commanded turn psi' and r are 0. rolling, pitching: phi', theta', rad/s.
+    beta_c, rad: -roll_loss_share phi' / (dihedral V), the sideslip that rolls the aircraft as far as ailerons
+    are lost; phi' / (dihedral V) within MOST_SIDESLIP_RAD. If neither heading nor bank is commanded, psi' and
+    r are 0. r stays within its limit. rolling, pitching: phi', theta', rad/s.
     """
     rates = autopilot.rates
     sin_roll, cos_roll = np.sin(attitude[ROLL]), np.cos(attitude[ROLL])
@@ -388,9 +436,9 @@ def set_body_rates(autopilot, y, attitude, rolling, pitching):
     rates[YAW] = 0.0
     if lateral:
         sideslip = -rolling / (autopilot.dihedral * autopilot.airspeed)
-        wanted = autopilot.roll_loss_share * clamp(sideslip, MOST_SIDESLIP_RAD)
-        keeping = autopilot.gain.sideslip * (y[BETA] - wanted)
-        rates[YAW] = turning * cos_pitch * cos_roll - pitching * sin_roll + keeping
+        beta_c = autopilot.roll_loss_share * clamp(sideslip, MOST_SIDESLIP_RAD)
+        damping = autopilot.gain.sideslip * (y[BETA] - beta_c)
+        rates[YAW] = turning * cos_pitch * cos_roll - pitching * sin_roll + damping
     rates[YAW] = clamp(rates[YAW], autopilot.rate_limit[YAW])
 
 
@@ -402,15 +450,16 @@ def set_power(autopilot, power, y, path, push):
 
     V_c: airspeed_to_fly; M: missing_acceleration, integrated unless the power is limited. While power stands
     in for a lost pitch, K is 0 and power_airspeed is set: the law of power.py has an airspeed loop of its
-    own. path: gamma_c, rad.
+    own, which can hold V_c within MAX_FROM_RECENT_MPS of the recent airspeed. At either end of the range, a
+    room is kept for engines that alone yaw the aircraft. path: gamma_c, rad.
     """
-    V, fly = autopilot.airspeed, autopilot.airspeed_to_fly
-    error = fly - V
+    V, V_c = autopilot.airspeed, autopilot.airspeed_to_fly
+    error = V_c - V
     autopilot.recent_airspeed_mps += autopilot.dt / RECENT_AIRSPEED_S * (V - autopilot.recent_airspeed_mps)
     recent = autopilot.recent_airspeed_mps
     along = autopilot.airspeed_to_fly_rate + autopilot.missing_acceleration
     if power.memory.engaged:
-        autopilot.power_airspeed = recent + clamp(fly - recent, MAX_FROM_RECENT_MPS)
+        autopilot.power_airspeed = recent + clamp(V_c - recent, MAX_FROM_RECENT_MPS)
         error = autopilot.power_airspeed - V
     else:
         along += autopilot.gain.speed * error

@@ -1,20 +1,28 @@
 """Accommodation of a fault: the mode that the law is in, and how effective it takes each surface to be.
 
-*Mode* [Zhang2005, sec. VI]. nominal until detection; adaptive until isolation, compensating an unknown fault;
-then reallocated (elevator, whose demand the flap can take over), or still adaptive with the isolated estimate
-(aileron, rudder: no second surface), or unanticipated (no known fault fits).
+*Mode of the supervisor* [Zhang2005, sec. VI]:
 
-*Surfaces.* Effectiveness, offset and lag of each, moved smoothly. From the diagnosis
-(diagnosis/conclusion.py): an isolated loss scales the command, a surface that does not follow its command is
-parked, an offset is subtracted, a slow surface is left to its pace. The oracle is informed of the truth
-instead: the loop fills in the true faults of the instant (loop/frame.py), and no other law reads them.
+    nominal          until detection
+    adaptive         until isolation: the law compensates an unknown fault; afterwards with the isolated
+                     estimate, if no second surface can take over (aileron, rudder)
+    reallocated      after isolation of an elevator fault: the flap takes over a part of the demand
+    unanticipated    no known fault fits
+
+*Surfaces.* The law assumes an effectiveness, an offset and a lag of each surface. They follow from the
+assessment of the diagnosis: an isolated loss scales the command, a surface that does not follow its command
+is parked, an offset is subtracted, and a slow surface is waited for. A law that is informed of the truth (an
+oracle) takes the true faults of the instant instead; no other law reads them.
 
 The laws divide by the effectiveness in `output`. It is rate limited, so that a decision never kicks the
-surfaces, and projected: a surface weaker than `least_effectiveness` is given up.
+surfaces. A surface whose effectiveness is below `least_effectiveness` is given up: nothing is divided by it.
 
-Arguments of the kernels are records. This file defines supervisor, surfaces and its output and config;
-diagnosis/conclusion.py verdict and assessment; loop/frame.py faults; control/state.py the law's config;
-control/allocation.py layout.
+Records among the arguments, and the file that defines each:
+
+    supervisor, surfaces (output, config)    this file
+    verdict, assessment                      diagnosis/conclusion.py
+    faults, true faults of the instant       loop/frame.py
+    config of a law                          control/state.py
+    layout                                   control/allocation.py
 """
 
 import numpy as np
@@ -29,15 +37,22 @@ from beaver_ftc.scenario.diagnosis import MODES, ControlConfig
 MODE_NOMINAL, MODE_ADAPTIVE, MODE_REALLOCATED, MODE_UNANTICIPATED = range(len(MODES))
 MAX_EVENTS = 64  # number of modes, and of exits from the envelope, that a flight records
 
-# mode: now; informed: whether the law in charge is informed. n_modes: number of modes there were; mode_at_s,
-# mode_is: since when, s, and which, for the first ones and the last.
+# mode: the present one; informed: whether the law in charge is informed. n_modes: number of modes so far;
+# mode_at_s, mode_is: when each began, s, and which it was; the last place has the latest once they are full.
 SUPERVISOR = record(mode=int, informed=int, n_modes=int, mode_at_s=MAX_EVENTS, mode_is=(int, MAX_EVENTS))
 
 
 @kernel
 def mode_from(config, layout, verdict, assessment):
-    """The mode that the diagnosis asks for; verdict: what it concludes; config: what the law is given
-    (control/state.py). A law that does not use the verdict stays nominal: it has nothing to reconfigure.
+    """The mode that follows from the diagnosis, by the first row that applies:
+
+        the law does not use the verdict, or nothing is detected        nominal
+        no surface, and the fault is outside the class                  unanticipated
+        the main surface of pitch, a stand-in, and config.reallocates   reallocated
+        otherwise                                                       adaptive
+
+    surface: the isolated one; where all types are diagnosed, the target if its command is scaled or it is
+    given up. A law that does not use the verdict has nothing to reconfigure.
     """
     if not config.uses_verdict or not verdict.detected:
         return MODE_NOMINAL
@@ -47,13 +62,14 @@ def mode_from(config, layout, verdict, assessment):
         surface = verdict.target if replaced else -1
     if surface < 0 and verdict.isolated_estimator == UNANTICIPATED:
         return MODE_UNANTICIPATED
-    relieved = config.reallocates and surface == layout.main[PITCH] and layout.stand_in >= 0
-    return MODE_REALLOCATED if relieved else MODE_ADAPTIVE
+    reallocates = config.reallocates and surface == layout.main[PITCH] and layout.stand_in >= 0
+    return MODE_REALLOCATED if reallocates else MODE_ADAPTIVE
 
 
 @kernel
 def true_mode(config, layout, faults):
-    """The mode for a law that knows the true fault the moment it occurs; config: as in `mode_from`."""
+    """The mode for a law that is informed of the true fault when it occurs; config: as in `mode_from`.
+    Cm_alpha3 is the coefficient of the fault outside the class [Zhang2005]."""
     elevator = layout.main[PITCH]
     if not faults.present:
         return MODE_NOMINAL
@@ -65,11 +81,11 @@ def true_mode(config, layout, faults):
 
 @kernel
 def supervise(supervisor, wanted, informed, t):
-    """Go to the mode wanted, from nominal always to `adaptive` first, and note every change; t s.
+    """Change to the mode `wanted`, from nominal always by way of adaptive, and record every change at t s.
 
-    An isolation in the very frame of the alarm is acted upon one frame later, so that the published sequence
-    (compensate the unknown, then use what is known of it) holds whatever the diagnosis is capable of. A law
-    that is not informed begins as nominal after one that was.
+    An isolation in the frame of the alarm therefore takes effect one frame later. So the published sequence
+    (compensate the unknown fault, then use the isolated one) holds however fast the diagnosis is. A law that
+    is not informed begins as nominal after one that was.
     """
     nominal = supervisor.mode == MODE_NOMINAL or supervisor.informed > informed
     mode = MODE_ADAPTIVE if nominal and wanted != MODE_NOMINAL else wanted
@@ -86,10 +102,15 @@ CONFIG = record(effectiveness_step=float, least_effectiveness=float)
 
 @sized
 def output_dtype(n: int) -> np.dtype:
-    """For each of n surfaces: effectiveness, which moves to target by at most a step a frame; offset and lag,
-    rad; given_up: whether the law's own observer withdraws it; parked: whether it is commanded to its trim.
-    authority_lost: whether a surface is slow or parked in this frame. unknown (3,) rad/s2: acceleration that
-    no known fault explains."""
+    """What the law assumes of n surfaces.
+
+    target, effectiveness (n,)    effectiveness moves to target by at most a step a frame
+    offset, lag (n,)              rad
+    given_up (n,)                 whether the law's own observer withdraws the surface (laws/withdrawal.py)
+    parked (n,)                   whether the surface is commanded to its trim
+    authority_lost                whether a surface is slow or parked in this frame
+    unknown (3,)                  rad/s2, acceleration that no known fault explains
+    """
     return record(
         target=n, effectiveness=n, offset=n, lag=n, given_up=(int, n), parked=(int, n), authority_lost=int,
         unknown=3,
@@ -103,7 +124,8 @@ def surfaces_dtype(n: int) -> np.dtype:
 
 
 def configure(surfaces: np.void, config: ControlConfig, informed: bool, dt_s: float) -> None:
-    """Fill the record (`surfaces_dtype`); informed: whether the law knows the true faults, at once."""
+    """Fill the record (`surfaces_dtype`); informed: whether the law receives the true faults. Its step is
+    then not limited."""
     step = np.inf if informed else config.effectiveness_rate_per_s * dt_s
     fill(surfaces["config"], least_effectiveness=config.least_effectiveness, effectiveness_step=step)
     surfaces["output"]["effectiveness"] = 1.0
@@ -155,8 +177,8 @@ def follow_truth(surfaces, faults, u):
 
 @kernel
 def start_of(output, assessment, s):
-    """Effectiveness of surface s from which this frame's step begins. A jam bypasses the rate limit, as does
-    an effectiveness that is well known."""
+    """Effectiveness of surface s from which the step of this frame begins. If the assessment applies at once
+    (a jam, or a precise estimate), it begins at the target, which bypasses the rate limit."""
     return assessment.effectiveness[s] if assessment.at_once[s] else output.effectiveness[s]
 
 
@@ -170,14 +192,14 @@ def approach(surfaces, s, start, target):
 
 @kernel
 def give_up(output, s):
-    """Give up surface s: its effectiveness is 0 at once, without the limit of a step."""
+    """Give up surface s: its effectiveness is 0 at once, without the limit on a step."""
     output.given_up[s], output.target[s], output.effectiveness[s] = 1, 0.0, 0.0
 
 
 @kernel
 def estimate_unknown(output, config, assessment, faults, prediction, y):
-    """Fill output.unknown (3,) rad/s2: the truth's pitching moment for an informed law, the diagnosis'
-    estimate for others that use the verdict."""
+    """Fill output.unknown (3,) rad/s2: for an informed law the true pitch acceleration by Cm_alpha3, for
+    others that use the verdict the estimate of the diagnosis."""
     output.unknown[:] = 0.0
     if config.informed:
         output.unknown[PITCH] = unanticipated_pitch(prediction.design, y, faults.Cm_alpha3)
@@ -195,12 +217,15 @@ def usable_effectiveness(surfaces, s):
 
 @kernel
 def park_failed_surfaces(output, assessment, faults, informed):
-    """Park a surface that does not follow its command. It is commanded to its trim, so that a surface that
-    comes loose moves there, which the diagnosis detects. From then on the reference is governed (hedged and
-    scaled, laws/reference.py)."""
+    """Park each surface that does not follow its command: an informed law sees that it is immovable, the
+    law's observer has withdrawn it, or the diagnosis gives it up and no effectiveness is left.
+
+    A parked surface is commanded to its trim. If it comes loose, it moves there, which the diagnosis detects.
+    From then on the reference is governed (hedged and scaled, laws/reference.py).
+    """
     for s in range(output.parked.size):
         immovable = informed and faults.immovable[s]
-        fixed = assessment.accommodation_mode[s] == GIVE_UP and output.effectiveness[s] == 0.0
-        output.parked[s] = immovable or output.given_up[s] or fixed
+        is_held = assessment.accommodation_mode[s] == GIVE_UP and output.effectiveness[s] == 0.0
+        output.parked[s] = immovable or output.given_up[s] or is_held
         if output.parked[s]:
             output.authority_lost = 1

@@ -1,11 +1,24 @@
 """Allocation: the surfaces that give the demanded angular accelerations, and what they can give at all.
 
 An aircraft with one surface an axis and a stand-in needs a few lines: the lateral pair, the elevator, and the
-hand-over from elevator to flap. Any other number of surfaces is allocated by constrained least squares
-(least_squares.py), started from the frame before; the hand-over is there a matter of each surface's weight.
+hand-over from elevator to flap (`allocate`). Any other set of surfaces is allocated by constrained least
+squares (least_squares.py), started from the frame before (`allocate_generally`); the weight of each surface
+then takes the place of the hand-over.
 
-The attainable moment set is the image of the travels under G, with what is given up and what is off already
-in it [Durham1993]; here the interval it spans on each axis. A demand outside it no law can meet.
+The attainable moment set is the image of the travels under G [Durham1993]. Here it is the interval that it
+spans on each axis (`attainable`), with the effectiveness of each surface in G. No law can meet a demand
+outside of it.
+
+Words for surfaces:
+
+    main        the surface that leads an axis
+    stand-in    the surface that takes the place of the main surface of pitch: the flap of the Beaver
+    backup      any surface that waits until pitch is handed over; the stand-in is one
+    share       of pitch that is handed over to the backups, 0 to 1
+
+    G           (3, n) rad/s2 per rad; in `axes.G` times the effectiveness of each surface
+    u           (n,) rad, command
+    output      record, output of `allocation_dtype`
 """
 
 import numpy as np
@@ -17,16 +30,21 @@ from beaver_ftc.control.least_squares import FREE, LOW, problem_dtype, solve
 from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
 from beaver_ftc.scenario.declared import Declared
 
-RELUCTANT = 1e-4  # least factor of a backup's weight, when nothing is handed over to it
+RELUCTANT = 1e-4  # least factor on a backup's weight, when nothing is handed over to it; largest: 1 / it
 TINY = 1e-300  # in place of a divisor of zero
 
 
 @sized
 def layout_dtype(n: int) -> np.dtype:
-    """Configuration of n surfaces. main (3,): the surface that leads each axis; stand_in: the one that takes
-    the place of pitch's, or -1. trim, low, high, rad: trim and stops. is_backup: whether a surface waits
-    until pitch is handed over. authority (3, n): share of each surface in the authority about each axis;
-    backups have none in pitch. general: see `_is_general`."""
+    """Configuration of n surfaces.
+
+    main (3,)             the surface that leads each axis
+    stand_in              the surface that takes the place of the main surface of pitch, -1 for none
+    trim, low, high (n,)  rad, deflection in trim, and stops
+    is_backup (n,)        whether a surface waits until pitch is handed over
+    authority (3, n)      share of each surface in the authority about each axis; backups have none in pitch
+    general               whether `allocate_generally` is necessary (`_is_general`)
+    """
     return record(
         main=(int, 3), stand_in=int, trim=n, low=n, high=n, general=int, is_backup=(int, n), authority=(3, n)
     )
@@ -34,18 +52,30 @@ def layout_dtype(n: int) -> np.dtype:
 
 @sized
 def axes_dtype(n: int) -> np.dtype:
-    """What the surfaces are to do about each axis. G (3, n) rad/s2 per rad: times the effectiveness of each
-    surface. From the law, rad/s2: demand; hold, the part of it that only holds the rates; both less the
-    moments of offsets; disturbance, which the law's observer finds, if it has one. shortfall, rad/s2: the
-    part of the demand that was not given; beyond: whether not even the rates can be held."""
+    """What the surfaces are to do about each axis (3,), rad/s2.
+
+    G (3, n)        rad/s2 per rad, times the effectiveness of each surface
+    demand, hold    what the law demands, and the part that only holds the rates; both less the moments of
+                    offsets
+    disturbance     what the law's observer finds, if it has one
+    shortfall       the part of the demand that was not given
+    beyond          whether not even the rates can be held
+    """
     return record(G=(3, n), demand=3, hold=3, disturbance=3, shortfall=3, beyond=(int, 3))
 
 
 @sized
 def allocation_dtype(n: int) -> np.dtype:
-    """hand_over_step: change of hand_over in a frame. command (n,) rad; saturated (n,): whether a surface
-    stands at a stop. hand_over: how far pitch is handed over to its stand-in, 0 to 1; lost_share: the part of
-    pitch that the main surface has lost; transfer_share: the part of pitch that the stand-in carries now."""
+    """The stage's records for n surfaces.
+
+    hand_over_step   change of hand_over in a frame
+    problem          of least_squares.py, used if `layout.general`
+    command (n,)     rad
+    saturated (n,)   whether a surface is commanded to a stop
+    hand_over        how far pitch is handed over to the stand-in, 0 to 1
+    lost_share       the part of pitch that the main surface has lost, 0 to 1
+    transfer_share   the part of pitch that the stand-in carries now, 0 to 1 (`hand_over_pitch`)
+    """
     return record(
         config=record(hand_over_step=float), memory=record(problem=problem_dtype(n)),
         output=record(command=n, saturated=(int, n), hand_over=float, lost_share=float, transfer_share=float),
@@ -68,16 +98,20 @@ def configure(control: np.void, declared: Declared, travel: np.ndarray) -> None:
 
 
 def _is_general(aircraft: Aircraft) -> bool:
-    """Whether there are more surfaces than lead an axis or stand in for pitch's leader first, or one that
+    """Whether there are more surfaces than those that lead an axis and the first stand-in, or one surface
     leads two axes."""
     several = aircraft.n > len(aircraft.primary) + min(len(aircraft.stand_ins), 1)
     return several or len(aircraft.primary) < len(AXES)
 
 
 def _authority(declared: Declared, layout: np.void) -> np.ndarray:
-    """Share (3, n) of each surface in the authority about each axis: |G_is| travel_s over their sum, for the
-    surfaces whose largest effect is about this axis. If one surface leads each axis, or none has its largest
-    effect about it, the one that leads has the share 1."""
+    """Share (3, n) of each surface s in the authority about each axis i:
+
+        |G_is| travel_s / their sum        over the surfaces whose largest effect is about this axis
+
+    The surface that leads the axis has the share 1 if the aircraft is not general, or if no surface has its
+    largest effect about the axis. Backups have none in pitch.
+    """
     aircraft = declared.aircraft
     shares = np.zeros((3, aircraft.n))
     if not _is_general(aircraft):
@@ -96,10 +130,10 @@ def _authority(declared: Declared, layout: np.void) -> np.ndarray:
 @kernel
 def remaining(layout, effectiveness, i):
     """Remaining share of the authority about axis i, 0 to 1: sum_s authority_is effectiveness_s."""
-    left = 0.0
+    share = 0.0
     for s in range(effectiveness.size):
-        left += layout.authority[i, s] * effectiveness[s]
-    return left
+        share += layout.authority[i, s] * effectiveness[s]
+    return share
 
 
 @kernel
@@ -131,7 +165,7 @@ def set_demand(axes, i, demand, hold, disturbance):
 
 @kernel
 def subtract_offsets(axes, offset, G):
-    """Subtract G offset from demand and hold of the law; offset (n,) rad, G (3, n) rad/s2 per rad."""
+    """Subtract the moments of offsets, G offset, from demand and hold of the law; offset (n,) rad."""
     for i in range(3):
         for s in range(G.shape[1]):
             axes.demand[i] -= G[i, s] * offset[s]
@@ -140,8 +174,8 @@ def subtract_offsets(axes, offset, G):
 
 @kernel
 def form_effectiveness_matrix(axes, G, surfaces, uses_verdict):
-    """Fill axes.G (3, n) rad/s2 per rad: the design model's G, times the `usable_effectiveness` of each
-    surface if the law uses the verdict."""
+    """Fill axes.G: the design model's G, times the `usable_effectiveness` of each surface if the law uses the
+    verdict."""
     if not uses_verdict:
         axes.G[:] = G
         return
@@ -157,7 +191,8 @@ def lateral(axes, output, layout):
 
         G_roll,a u_a + G_roll,r u_r = roll,    G_yaw,a u_a + G_yaw,r u_r = yaw
 
-    When one saturates, the other makes the best of its own axis.
+    When one saturates, the other gives as much of its own axis as it can. The order is therefore a, r, a: r
+    is computed with the a that the stops allow, and a again with the r that they allow.
     """
     G, u = axes.G, output.command
     a, r = layout.main[ROLL], layout.main[YAW]
@@ -170,7 +205,7 @@ def lateral(axes, output, layout):
 
 @kernel
 def smoothstep(share):
-    """3 s^2 - 2 s^3 of a share s: from 0 to 1 with no kink at either end."""
+    """3 s^2 - 2 s^3 of a share s: from 0 to 1 with slope 0 at either end."""
     return share * share * (3.0 - 2.0 * share)
 
 
@@ -178,15 +213,16 @@ def smoothstep(share):
 def pitch(axes, output, layout, effectiveness, share, probe):
     """Elevator and flap for the pitch demand, rad/s2.
 
-    Before the hand-over (share 0) the elevator e carries all. After it (1), the elevator holds its trimmed
-    moment, the flap f carries what moves, and what the flap's short upward travel cannot give goes back to
-    what is left of the elevator. Without a flap the elevator carries what it can.
+    Before the hand-over (share 0), the elevator e carries the whole demand. After it (share 1), the flap f
+    carries all but the trimmed moment of a healthy elevator, which the elevator keeps. The upward travel of
+    the flap is short: what it cannot give returns to the elevator. Without a flap the elevator carries what
+    it can.
 
-        u_f = trim_f + share ((demand - G_e / effectiveness trim_e) / G_f - trim_f) + probe
+        u_f = trim_f + share ((demand - hold) / G_f - trim_f) + probe,    hold = G_e / effectiveness trim_e
         u_e = (demand - G_f u_f) / G_e
 
-    G_e, G_f: of pitch, with effectiveness in it, rad/s2 per rad; effectiveness: of the elevator; probe: rad
-    of the flap.
+    G_e, G_f: of pitch, rad/s2 per rad, with the effectiveness of each surface in it; effectiveness: of the
+    elevator; probe: rad of the flap.
     """
     G, u, needed = axes.G, output.command, axes.demand[PITCH]
     e, f = layout.main[PITCH], layout.stand_in
@@ -200,42 +236,44 @@ def pitch(axes, output, layout, effectiveness, share, probe):
 
 @kernel
 def allocate(axes, output, layout, effectiveness, share, probe):
-    """Fill the command (n,) rad for axes.demand (3,) rad/s2; effectiveness (n,); the rest: see `pitch`."""
+    """Fill the command (n,) rad for axes.demand (3,) rad/s2; share, probe: see `pitch`."""
     lateral(axes, output, layout)
     pitch(axes, output, layout, effectiveness[layout.main[PITCH]], share, probe)
 
 
 @kernel
 def set_problem(problem, G, layout, effectiveness, prediction, share, probe):
-    """Set the limits low, high of the surfaces within a frame, rad, where each of them prefers to be,
-    u_preferred, rad, and the weight with which it leaves that, rad2; G (3, n) rad/s2 per rad; effectiveness
-    (n,); share, probe: as in `pitch`.
+    """Fill the problem of least_squares.py for this frame: the limits of each surface, rad, the deflection
+    that it prefers, rad, and the weight with which it leaves that, rad2.
 
         low, high = u -+ reach, within the stops        reach: by the rate limit in a frame, rad
         u_preferred = trim / effectiveness, within the stops
         weight = half^2,  of a backup half^2 ratio      half: half the travel, rad
-        ratio = share own / ((1 - share) waiting)
+        ratio = share others / ((1 - share) backups)    within RELUCTANT and 1 / RELUCTANT
 
-    own, waiting: sums of half^2 G_pitch^2 over the surfaces that are no backups, and over the backups.
+    others, backups: sums of half^2 G_pitch^2 over the surfaces that are no backups, and over the backups.
+    G (3, n) rad/s2 per rad; effectiveness (n,); share, probe: as in `pitch`. prediction: u, where the
+    surfaces are, and their actuators; w: length of a JSBSim frame in frames.
 
-    A backup gives `share` of what pitch demands beyond the trimmed moments: of two that move pitch alone
-    that is the published hand-over. A probe is held, and the others give what it does not leave.
+    Why this ratio: the backups then give `share` of what pitch demands beyond the trimmed moments. With two
+    surfaces that move pitch alone this is the published hand-over. During a probe the stand-in is held at its
+    trim + probe, and the other surfaces give the rest of the demand.
     """
-    own, waiting, u = 0.0, 0.0, prediction.u
+    others, backups, u = 0.0, 0.0, prediction.u
     for s in range(u.size):
         reach = prediction.actuators.step[s] / prediction.w
-        half, left = 0.5 * (layout.high[s] - layout.low[s]), effectiveness[s]
-        hold = layout.trim[s] / left if left > 0.0 else layout.trim[s]
-        problem.u_preferred[s] = within_stops(layout, s, hold)
+        half, E = 0.5 * (layout.high[s] - layout.low[s]), effectiveness[s]
+        trim = layout.trim[s] / E if E > 0.0 else layout.trim[s]
+        problem.u_preferred[s] = within_stops(layout, s, trim)
         problem.weight[s] = half * half
         problem.low[s] = within_stops(layout, s, u[s] - reach)
         problem.high[s] = max(min(layout.high[s], u[s] + reach), problem.low[s])
         moment = half * half * G[PITCH, s] ** 2
         if layout.is_backup[s]:
-            waiting += moment
+            backups += moment
         else:
-            own += moment
-    ratio = share * own / max((1.0 - share) * waiting, TINY)
+            others += moment
+    ratio = share * others / max((1.0 - share) * backups, TINY)
     for s in range(u.size):
         if layout.is_backup[s]:
             problem.weight[s] *= min(max(ratio, RELUCTANT), 1.0 / RELUCTANT)
@@ -249,14 +287,14 @@ def set_problem(problem, G, layout, effectiveness, prediction, share, probe):
 def allocate_generally(axes, allocation, layout, effectiveness, prediction, share, probe):
     """Fill the command (n,) rad for any number of surfaces, within stops and rates, by least squares.
 
-    effectiveness (n,); share, probe: as in `pitch`. With several elevators the backups take over no more than
-    what they have lost.
+    effectiveness (n,); share, probe: as in `pitch`. With several elevators (the main one has less than the
+    whole authority of pitch) the backups take over no more than the share that the elevators have lost.
     """
     problem = allocation.memory.problem
     output = allocation.output
-    left = remaining(layout, effectiveness, PITCH)
+    remains = remaining(layout, effectiveness, PITCH)
     if layout.authority[PITCH, layout.main[PITCH]] < 1.0:
-        share = min(share, 1.0 - left)
+        share = min(share, 1.0 - remains)
     set_problem(problem, axes.G, layout, effectiveness, prediction, share, probe)
     solve(problem, axes.G, axes.demand)
     for s in range(output.command.size):
@@ -267,16 +305,18 @@ def allocate_generally(axes, allocation, layout, effectiveness, prediction, shar
 
 @kernel
 def spill_to_flap(axes, output, layout):
-    """Give the flap what an elevator at its stop leaves of the pitch demand, as allocated.
+    """Give the flap the part of the pitch demand that an elevator at its stop does not give:
 
-    The observer has by then found what the elevator does not do, jammed or too weak, and asked it for more
-    than it can give: the flap need not wait until that has a name.
+        u_f = (demand - G_e u_e) / G_f        if the elevator is saturated
+
+    The observer of the law finds what an elevator does not do that is jammed or too weak. The law then
+    demands more than the elevator can give. The flap need not wait until the fault is named.
     """
     G, u = axes.G, output.command
     e, f = layout.main[PITCH], layout.stand_in
     if f >= 0 and output.saturated[e]:
-        left = axes.demand[PITCH] - G[PITCH, e] * u[e]
-        u[f] = clip(output, layout, f, divide(left, G[PITCH, f]))
+        shortfall = axes.demand[PITCH] - G[PITCH, e] * u[e]
+        u[f] = clip(output, layout, f, divide(shortfall, G[PITCH, f]))
 
 
 @kernel
@@ -289,8 +329,10 @@ def park(output, layout, parked):
 
 @kernel
 def lead_compensate(output, layout, lead, u):
-    """Command beyond what is wanted, u + lead (command - u), so that a lagging actuator is there sooner;
-    lead, u (n,): u rad is where the actuators are."""
+    """Command each surface beyond the wanted deflection, so that a lagging actuator reaches it sooner:
+
+    command <- u + lead (command - u), within the stops        if lead > 1; u (n,) rad: actuators; lead (n,)
+    """
     command = output.command
     for s in range(u.size):
         if lead[s] > 1.0:
@@ -299,13 +341,16 @@ def lead_compensate(output, layout, lead, u):
 
 @kernel
 def hand_over_pitch(allocation, reallocated, at_once, remains, least):
-    """Hand the pitch demand to the flap, or back as soon as it is `reallocated` no longer, by the same step.
+    """Hand the pitch demand over to the flap while it is `reallocated`, else back, by the same step a frame:
+
+        hand_over <- min(hand_over + step, 1), at_once at least 1 - remains      if reallocated
+        hand_over <- max(hand_over - step, 0)                                    otherwise
+        lost_share = 1 - remains, or 1 if remains < least
+        transfer_share = smoothstep(hand_over) lost_share        smoothstep(1) if nothing remains
 
     at_once: whether the lost part is handed over in one frame, as after a jam. remains: effectiveness of the
-    main surface; less than `least` counts as 0. While pitch is handed back, lost_share stays: the estimate of
-    the main surface may return to 1 in one frame, but the command must not jump.
-
-        transfer_share = smoothstep(hand_over) lost_share,    lost_share = 1 - remains; 1 below `least`
+    main surface. While pitch is handed back, lost_share stays: the estimate of the main surface may return to
+    1 in one frame, but the command must not jump.
     """
     config, output = allocation.config, allocation.output
     if reallocated:
@@ -330,9 +375,9 @@ def attainable(G, layout, engine_authority, i):
     """
     least, greatest = engine_authority[0, i], engine_authority[1, i]
     for s in range(layout.low.size):
-        one, other = G[i, s] * layout.low[s], G[i, s] * layout.high[s]
-        least += min(one, other)
-        greatest += max(one, other)
+        at_low, at_high = G[i, s] * layout.low[s], G[i, s] * layout.high[s]
+        least += min(at_low, at_high)
+        greatest += max(at_low, at_high)
     return least, greatest
 
 

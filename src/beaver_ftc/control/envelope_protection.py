@@ -6,16 +6,21 @@ Level flight of the design model takes an elevator that depends on dynamic press
     qdyn S CX = m g sin alpha,   qdyn S CZ + m g cos alpha = 0,   Cm = 0
 
 in angle of attack, slipstream and elevator: wings level, no rates, no sideslip, the engine free. S m2: wing
-area; m kg: mass; g m/s2: gravity. What acts like the elevator now, rad, is estimated from the balance of the
-pitch moments (`average_acting_elevator`),
+area; m kg: mass; g m/s2: gravity.
 
-    acting = offset + left u + d / G
+The *acting elevator*, rad, is the deflection of a healthy elevator that would give the pitch moments that
+there are (`average_acting_elevator`):
 
-offset rad, left: the elevator's offset and remaining effectiveness; u rad: its position; d rad/s2: what the
-law's observer finds unexplained; G rad/s2 per rad: its effectiveness in pitch. So a jam is known where it
-stands before its type is. The speeds at which the flap, less a reserve to fly with, makes up for the rest
-are those that can be held; the commanded airspeed is brought among them. A speed for which the elevator, or
-what is left of it, does not suffice cannot be held by any law.
+    acting = offset + E u + d / G
+
+    offset, E   rad, 1          offset and remaining effectiveness of the elevator, by the diagnosis
+    u           rad             its position
+    d           rad/s2          pitch acceleration that the law's observer finds unexplained
+    G           rad/s2 per rad  effectiveness of a healthy elevator in pitch
+
+So the position of a jam is known before its type is. An airspeed can be held if the flap, less a reserve to
+fly with, makes up for the rest (`find_airspeeds_that_can_be_held`). The airspeed to fly is the nearest of
+these to the commanded one. No law can hold an airspeed for which elevator and flap do not suffice.
 """
 
 from functools import lru_cache
@@ -34,51 +39,58 @@ from beaver_ftc.design.table import AIRSPEED, QDYN
 from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
 from beaver_ftc.scenario.declared import Declared
 
-ACTING_S = 4.0  # time constant of the mean balance: gusts pitch within a second
+ACTING_S = 4.0  # time constant of the mean acting elevator, because gusts pitch within a second
 HOLD_SETTLED_S = 0.5  # time of averaging before which no airspeed is limited
-NOTED_MPS, NOTED_RAD = 0.5, 0.02  # A limit that changes the command by so much is in force.
-MOST_BANK_DEG = 30.0  # of a healthy aircraft
-# Of 0, 0.7, 1.5 and 3 deg kept of the flap at the end of the airspeeds that can be held, the one with which
-# most jams were kept; and how fast a limit moves the command: about as fast as drag slows the aircraft down.
-FLAP_RESERVE_DEG, MAX_AIRSPEED_RATE_MPS2 = 0.7, 1.0
+NOTED_MPS, NOTED_RAD = 0.5, 0.02  # A limit that changes the command by this much is in force.
+MOST_BANK_DEG = 30.0  # largest bank of a healthy aircraft
+# Part of the flap's travel that is kept at the ends of the airspeeds that can be held. Of 0, 0.7, 1.5 and 3
+# deg, it is the one with which most flights with a jam were kept.
+FLAP_RESERVE_DEG = 0.7
+MAX_AIRSPEED_RATE_MPS2 = (
+    1.0  # rate at which a limit moves the command: about as fast as drag slows the aircraft
+)
 THRUST = "dpt"  # the signal that stands for the engine
-STEP = 1e-30  # of a complex step
-ITERATIONS, CLOSE = 12, 1e-9  # of Newton's method; imbalance of a coefficient that counts as none
-STEEPEST_RAD, MOST_THRUST = 0.5, 3.0  # beyond, the polynomials have solutions that no aircraft flies
-PER_FLAP, GUESS = -0.12, (0.1, 0.5, 0.0)  # alpha over flap, and alpha, slipstream, elevator without it
+STEP = 1e-30  # of a complex step: far below rounding, so the derivative is exact to rounding
+ITERATIONS, CLOSE = 12, 1e-9  # of Newton's method; imbalance of a coefficient that counts as zero
+# Largest angle of attack and slipstream: beyond them the polynomials have solutions that no aircraft flies.
+STEEPEST_RAD, MOST_THRUST = 0.5, 3.0
+PER_FLAP, GUESS = -0.12, (0.1, 0.5, 0.0)  # start: slope of alpha over flap; alpha, slipstream, elevator
 
-FASTEST, SLOWEST, BANK_LIMIT = range(3)  # the limits
+FASTEST, SLOWEST, BANK_LIMIT = range(3)  # the limits, as indices of in_force, from_s and value
 N_QDYN, N_FLAP = 12, 5
 HOLDING = record(
-    has_table=int, limits_airspeed=int, n_averaged_frames=int, flap_reserve=float,
+    has_table=int,  # whether the table of level flight is filled
+    limits_airspeed=int,  # whether the airspeed to fly differs from the command
+    n_averaged_frames=int,  # frames in the means below
+    flap_reserve=float,  # rad
     max_airspeed_rate_mps2=float,
-    # rad: the elevator that level flight takes, over dynamic pressure, Pa, and flap, rad
+    # table: the elevator that level flight takes, rad, over dynamic pressure, Pa, and flap, rad
     qdyn=N_QDYN, flap=N_FLAP, elevator=(N_QDYN, N_FLAP),
-    # rad: what acts like the elevator, and what of it is commanded, smoothed
+    # means over ACTING_S, rad: of the acting elevator, and of its commanded part E u
     mean_acting_elevator=float, mean_commanded_elevator=float,
     fastest=float, slowest=float,  # m/s, between which level flight can be held
-    bank=float,  # rad: the bank limit, smoothed
-    # of each limit whether it is in force now, since when, s, and its last value, m/s or rad
+    bank=float,  # rad, the bank limit, smoothed
+    # of each limit: whether it is in force now; since when, s, -1 for never; its last value, m/s or rad
     in_force=(int, 3), from_s=3, value=3,
 )  # fmt: skip
 
 
 @kernel
 def limit_airspeed_to_fly(autopilot, layout, surfaces, u, unexplained, y, t):
-    """Set autopilot.airspeed_to_fly of this frame: the commanded airspeed where it can be held.
+    """Set autopilot.airspeed_to_fly of this frame, at t s: the nearest to the commanded airspeed that can be
+    held. While elevator and flap are healthy, or without a table, any airspeed counts as one that can.
 
-    u (n,) rad: where the surfaces are. unexplained rad: the elevator that would give what the law's observer
-    finds in pitch.
+    u (n,) rad: where the surfaces are. unexplained: d / G, rad.
     """
     hold, e, f = autopilot.holding, layout.main[PITCH], layout.stand_in
     hold.fastest, hold.slowest = np.inf, 0.0
     effectiveness = surfaces.output.effectiveness
-    left = effectiveness[e]
-    whole = left >= 1.0 and (f < 0 or effectiveness[f] >= 1.0)
-    if whole or not hold.has_table:
+    E = effectiveness[e]
+    healthy = E >= 1.0 and (f < 0 or effectiveness[f] >= 1.0)
+    if healthy or not hold.has_table:
         hold.n_averaged_frames = 0
     else:
-        average_acting_elevator(hold, autopilot.dt, surfaces.output.offset[e], left * u[e], unexplained)
+        average_acting_elevator(hold, autopilot.dt, surfaces.output.offset[e], E * u[e], unexplained)
         if hold.n_averaged_frames * autopilot.dt > HOLD_SETTLED_S:
             find_airspeeds_that_can_be_held(hold, layout, surfaces, y)
     approach_airspeed_to_fly(autopilot)
@@ -87,9 +99,13 @@ def limit_airspeed_to_fly(autopilot, layout, surfaces, u, unexplained, y, t):
 
 @kernel
 def average_acting_elevator(hold, dt, offset, commanded, unexplained):
-    """Average the elevator that would account for the pitch moments there are, acting = offset + commanded +
-    unexplained, rad, over ACTING_S, at first over all frames alike: `offset` is how far it is off,
-    `commanded` what its remaining effectiveness gives."""
+    """Average the acting elevator and its commanded part E u, rad, over ACTING_S:
+
+        acting = offset + commanded + unexplained
+        mean <- mean + weight (value - mean),    weight = max(dt / ACTING_S, 1 / n)
+
+    n: averaged frames, so that at first all frames count alike. All in rad.
+    """
     acting = offset + commanded + unexplained
     hold.n_averaged_frames += 1
     weight = max(dt / ACTING_S, 1.0 / hold.n_averaged_frames)
@@ -101,30 +117,36 @@ def average_acting_elevator(hold, dt, offset, commanded, unexplained):
 def find_airspeeds_that_can_be_held(hold, layout, surfaces, y):
     """Fill the fastest and the slowest airspeed that can be held, m/s.
 
-    The flap may stand at one end of its travel, less the reserve. What acts like the elevator may then be
+    The flap may stand at either end of its travel, less the reserve, and the acting elevator at
 
-        fixed + left u,    u in its travel        fixed, rad: acts without a command; left: its effectiveness
+        fixed + E u,    u in its travel        fixed, rad: the part that acts without a command
 
-    and the limits are V = sqrt(2 qdyn / rho), rho kg/m3: of the air, by readings. The flap up and the
-    elevator's greatest give the fastest, the flap down and its least the slowest. A flap that is
-    given up stands at its offset.
+    The flap up and the greatest acting elevator give the fastest airspeed V, the flap down and the least one
+    the slowest: V = sqrt(2 qdyn / rho), qdyn by the table, rho kg/m3 of the air by the readings. A flap that
+    is given up stands at its offset.
     """
     e, f = layout.main[PITCH], layout.stand_in
-    elevator_left, flap_left = surfaces.output.effectiveness[e], surfaces.output.effectiveness[f]
+    E, E_flap = surfaces.output.effectiveness[e], surfaces.output.effectiveness[f]
     fixed = hold.mean_acting_elevator - hold.mean_commanded_elevator
-    least, greatest = fixed + elevator_left * layout.low[e], fixed + elevator_left * layout.high[e]
+    least, greatest = fixed + E * layout.low[e], fixed + E * layout.high[e]
     up, down = layout.low[f] + hold.flap_reserve, layout.high[f] - hold.flap_reserve
-    if flap_left < surfaces.config.least_effectiveness:
+    if E_flap < surfaces.config.least_effectiveness:
         up = down = within_stops(layout, f, surfaces.output.offset[f])
-    per_pa = 2.0 * y[QDYN] / y[AIRSPEED] ** 2
-    hold.fastest = np.sqrt(2.0 * dynamic_pressure_limit(hold, up, greatest, FASTEST) / per_pa)
-    hold.slowest = np.sqrt(2.0 * dynamic_pressure_limit(hold, down, least, SLOWEST) / per_pa)
+    rho = 2.0 * y[QDYN] / y[AIRSPEED] ** 2
+    hold.fastest = np.sqrt(2.0 * dynamic_pressure_limit(hold, up, greatest, FASTEST) / rho)
+    hold.slowest = np.sqrt(2.0 * dynamic_pressure_limit(hold, down, least, SLOWEST) / rho)
 
 
 @kernel
 def dynamic_pressure_limit(hold, flap, elevator, limit):
-    """The highest (limit FASTEST) or lowest (SLOWEST) dynamic pressure, Pa, of level flight with this flap
-    and elevator, rad, by the table. Infinite or 0 if the table does not bound it."""
+    """The dynamic pressure, Pa, at which level flight with this flap takes this elevator, rad: linear between
+    the points of the table, whose elevator is taken to rise with dynamic pressure.
+
+        the table's elevator exceeds this one    limit FASTEST              limit SLOWEST
+        from the first point on                  the first point            0
+        from a later point on                    between two points         the same
+        nowhere                                  infinite                   the last point
+    """
     before = between(flap, N_FLAP, hold.flap, row_of(hold.elevator, 0))
     if before > elevator:
         return hold.qdyn[0] if limit == FASTEST else 0.0
@@ -139,7 +161,8 @@ def dynamic_pressure_limit(hold, flap, elevator, limit):
 
 @kernel
 def approach_airspeed_to_fly(autopilot):
-    """Bring the airspeed to fly towards the nearest to the commanded one that can be held, without a bump."""
+    """Move the airspeed to fly towards the nearest to the command that can be held, at most at
+    max_airspeed_rate_mps2, so without a bump. Without a limit, it is the command."""
     hold, command = autopilot.holding, autopilot.command[SPEED]
     wanted = min(max(command, hold.slowest), hold.fastest)
     if wanted == command and not hold.limits_airspeed:
@@ -153,7 +176,9 @@ def approach_airspeed_to_fly(autopilot):
 
 @kernel
 def record_limits_in_force(autopilot, main, effectiveness, t):
-    """Note since when a limit is in force, and what it is at last; main (3,): who leads each axis."""
+    """Record which limits are in force at t s: those of the airspeed if they change the command by more than
+    NOTED_MPS, and that of the bank if ailerons or rudder have lost effectiveness. main (3,): the surface that
+    leads each axis."""
     hold, command = autopilot.holding, autopilot.command[SPEED]
     if autopilot.is_commanded[SPEED]:
         record_limit(hold, FASTEST, hold.fastest, hold.fastest < command - NOTED_MPS, t)
@@ -165,7 +190,7 @@ def record_limits_in_force(autopilot, main, effectiveness, t):
 
 @kernel
 def record_limit(hold, kind, value, in_force, t):
-    """Keep a limit that is in force now."""
+    """Record whether a limit is in force at t s and, if so, its value, and t if it is the first time."""
     hold.in_force[kind] = in_force
     if in_force:
         if hold.from_s[kind] < 0.0:
@@ -174,7 +199,8 @@ def record_limit(hold, kind, value, in_force, t):
 
 
 def set_up_level_flight_table(holding: np.void, layout: np.void, declared: Declared) -> None:
-    """The table of level flight, where the aircraft's file has forces and a flap for the elevator."""
+    """Fill the table of level flight, if the aircraft's file has forces, the signal THRUST, and a stand-in
+    for the elevator; the dynamic pressures are those of the envelope's airspeeds at sea level."""
     aircraft, flap = declared.aircraft, int(layout["stand_in"])
     fill(holding, from_s=-1.0, bank=radians(MOST_BANK_DEG), fastest=np.inf)
     if flap < 0 or not aircraft.forces or THRUST not in aircraft.signals:
@@ -206,7 +232,8 @@ def elevator_needed(
     Newton's method, z <- z - J^-1 F, for all n m points at once: z (n m, 3) = (alpha, slipstream, elevator),
     F = (CX - load sin alpha, CZ + load cos alpha, Cm), load = m g / (qdyn S), J = dF/dz by complex steps.
 
-    surfaces: elevator and flap of this aircraft. scale: what the designer multiplies single terms by.
+    surfaces: names of elevator and flap. scale: factors of the designer on single terms. All signals that are
+    not named here are 0.
     """
     q, flap = (values.ravel() for values in np.meshgrid(qdyn_pa, flap_rad, indexing="ij"))
     load = mass_kg * GRAVITY_MPS2 / (q * aircraft.geometry.wing_area_m2)
@@ -216,8 +243,8 @@ def elevator_needed(
     def imbalance(unknown: np.ndarray) -> np.ndarray:
         """F (n m, 3) at z (n m, 3)."""
         alpha, thrust, elevator = unknown.T
-        of = neutral | {"alpha": alpha, THRUST: thrust, surfaces[0]: elevator, surfaces[1]: flap}
-        CX, CZ, Cm = (aircraft.coefficient(name, of, ratio) for name in ("CX", "CZ", "Cm"))
+        signals = neutral | {"alpha": alpha, THRUST: thrust, surfaces[0]: elevator, surfaces[1]: flap}
+        CX, CZ, Cm = (aircraft.coefficient(name, signals, ratio) for name in ("CX", "CZ", "Cm"))
         return np.stack([CX - load * np.sin(alpha), CZ + load * np.cos(alpha), Cm], -1)
 
     unknown = np.tile(GUESS, (q.size, 1))

@@ -1,11 +1,12 @@
 """Engine power as the last means on pitch.
 
-The Beaver's power acts on pitch when neither elevator nor flap does.
+The Beaver's power acts on pitch when neither elevator nor flap does. It takes over once pitch has been lost
+for a while (`pitch_is_lost`, `engage`), and then moves the manifold pressure:
 
-    P = P_trim - K_V (V - V_bar) + K_theta theta_m                                   `wanted`
+    P = base - K_V (V - V_bar) + K_theta theta_m                                     `wanted`
     tau_V V_bar' = V - V_bar,    theta_m' = q - q_ref - theta_m / tau_theta          `follow`
 
-    P                  inHg        manifold pressure
+    P, base            inHg        manifold pressure; that of the trim, or of the autopilot
     V, V_bar           m/s         airspeed through a lag, and its slow mean: `speed`, `usual_speed`
     theta_m            rad         recent error of the pitch attitude: `attitude`
     q, q_ref           rad/s       pitch rate, and its reference
@@ -13,10 +14,15 @@ The Beaver's power acts on pitch when neither elevator nor flap does.
     tau_V, tau_theta   s           given as the shares of a frame `washout` and `leak`
 
 Airspeed fed back to power damps the phugoid, as when an airliner was flown on its engines alone
-[Burcham1997]. It is washed out, so that power does not fight the airspeed to which a jammed elevator trims
-the aircraft: it has not the moment for that. theta_m is what the pitch rate has missed of late: nose too
-high, and more power lowers it, Cm_dpt being negative. Power has little moment and a right-half-plane zero
-from there to the attitude: it can steady the aircraft, not make it follow a pitch rate.
+[Burcham1997]. The airspeed is washed out (less its slow mean), so that power does not fight the airspeed to
+which a jammed elevator trims the aircraft: the moment of power is too small for that. theta_m is the recent
+integral of the pitch-rate error. If the nose is too high, more power lowers it, because Cm_dpt is negative.
+Power has little moment, and a right-half-plane zero lies between power and attitude. So power can steady the
+aircraft, but cannot make it follow a pitch rate.
+
+    setting     power of an engine in its own unit: manifold pressure, inHg, of the Beaver
+    engaged     this law sets the power
+    y           measured signals (design/table.py)
 """
 
 from math import exp, radians
@@ -38,29 +44,34 @@ LEAST_LACK_RAD_S2 = 0.05  # smallest shortfall in pitch that counts: 2 to 3 inHg
 WHOLE_RANGE_S = 5.0  # time in which a lever goes from stop to stop
 YAW_SHARE = 0.5  # share of the rudder's travel that engine power may need; the rest is there to fly with
 
-# impatience, forgiveness: see `engage`; speed_gain, attitude_gain: K_V, K_theta; smoothing, washout, leak: 1
-# - exp(-dt / tau) of the lag of V, of V_bar and of theta_m; trim, low, high, step: in the units of the
-# setting, as is the command; dpt_factor, highest_dpt: see `_slipstream_limits`, 0 if nothing is known of a
-# slipstream.
+# enabled                      whether the law may use the engine (`is_at_hand`)
+# impatience, forgiveness      changes of `lost` in a frame (`engage`)
+# speed_gain, attitude_gain    K_V, K_theta
+# smoothing, washout, leak     1 - exp(-dt / tau) of the lag of V, of V_bar and of theta_m
+# trim, low, high, step        setting in trim, its range, and its largest change in a frame
+# dpt_factor, highest_dpt      see `_slipstream_limits`; 0 if there is no slipstream to account for
 POWER_CONFIG = record(
     enabled=int, impatience=float, forgiveness=float, speed_gain=float, attitude_gain=float,
     smoothing=float, washout=float, leak=float, trim=float, low=float, high=float, step=float,
     dpt_factor=float, highest_dpt=float,
 )  # fmt: skip
-# base: the setting unless engaged, in trim or by the autopilot.
+# base: the setting while not engaged: that of the trim, or of the autopilot.
 SETPOINT = record(base=float)
-# lost: see `engage`; engaged: whether this law sets the power; moved: whether the power differs from `base`.
-# speed, usual_speed, attitude: V, V_bar, theta_m.
+# lost: see `engage`, 0 to 1; engaged: whether this law sets the power; moved: whether the power differs from
+# `base`. speed, usual_speed, attitude: V, V_bar, theta_m.
 POWER_MEMORY = record(lost=float, engaged=int, moved=int, speed=float, usual_speed=float, attitude=float)
-# command: the common lever, then what each engine that is an effector has in addition (engines.py); in_use:
-# whether the levers are commanded. For the report: from_s, frames, since when and how long engaged; least,
-# greatest, the lowest and highest setting.
+# command            setting of the common lever, then of each engine that is an effector, less that of the
+#                    common lever (engines.py)
+# in_use             whether the levers are commanded
+# from_s, frames     for the report: when the law was first engaged, s (-1: never); number of frames
+# least, greatest    for the report: the lowest and highest setting
 POWER_OUTPUT = record(command=MAX_LEVERS, in_use=int, from_s=float, frames=int, least=float, greatest=float)
 POWER = record(config=POWER_CONFIG, setpoint=SETPOINT, memory=POWER_MEMORY, output=POWER_OUTPUT)
 
 
 def is_at_hand(declared: Declared) -> bool:
-    """Whether the declared built-in law may use the engine."""
+    """Whether the declared built-in law may use the engine: the scenario allows it, the engine is known, and
+    the law is informed, or it reallocates, may pitch by power, and receives the diagnosis of all types."""
     law = row_of(declared.control.law)
     diagnoses_all_types = declared.fdi.fault_class == "all" and law.pitch_by_power
     wanted = declared.control.power.enabled and (law.informed or (law.reallocates and diagnoses_all_types))
@@ -75,7 +86,7 @@ def _has_piston_engine(aircraft: Aircraft) -> bool:
 def configure_power(power: np.void, layout: np.void, declared: Declared) -> None:
     """Fill the record (dtype POWER); layout: of the surfaces."""
     settings, dt, config = declared.control.power, 1.0 / declared.rate_hz, power["config"]
-    initial: Any = declared.initial  # its engine's keys are the aircraft's
+    initial: Any = declared.initial  # the keys of its engine differ between aircraft
     lags_s = settings.smoothing_s, settings.washout_s, settings.attitude_memory_s
     smoothing, washout, leak = (1.0 - exp(-dt / lag_s) for lag_s in lags_s)
     fill(
@@ -85,10 +96,10 @@ def configure_power(power: np.void, layout: np.void, declared: Declared) -> None
         washout=washout, leak=leak,
     )  # fmt: skip
     power["output"]["from_s"] = -1.0
-    named = declared.aircraft.file.power_setting
-    if named is None:
+    name_and_setting = declared.aircraft.file.power_setting
+    if name_and_setting is None:
         return
-    name, setting = named
+    name, setting = name_and_setting
     trim = getattr(initial, name)
     power["setpoint"]["base"] = power["output"]["command"][0] = trim
     fill(power["output"], least=trim, greatest=trim)
@@ -102,10 +113,14 @@ def configure_power(power: np.void, layout: np.void, declared: Declared) -> None
 
 
 def _slipstream_limits(declared: Declared, layout: np.void) -> tuple[float, float]:
-    """dpt_factor, rho V^3 d dpt / d P of the engine [FDC], kg/m3 (m/s)^3 per inHg; and highest_dpt, at which
-    holding the propeller's yawing moment takes YAW_SHARE of the rudder's travel:
+    """Two values of the slipstream. dpt_factor = rho V^3 d dpt / d P of the engine [FDC], kg/m3 (m/s)^3 per
+    inHg: constant at a given rpm, so it is computed at rho = 1 kg/m3 and V = 1 m/s. highest_dpt: the dpt at
+    which holding the propeller's yawing moment takes YAW_SHARE of the rudder's travel, rad:
 
-        |Cn_dpt3| dpt^3 = YAW_SHARE |Cn_dr| rudder
+        |Cn_dpt3| dpt^3 = YAW_SHARE |Cn_dr| rudder_rad
+
+    Cn_dr: sum over the terms of all surfaces that move yaw; rudder_rad: the travel of the rudder to its
+    nearer stop. highest_dpt is infinite if the propeller has no yawing moment.
     """
     initial: Any = declared.initial
     aircraft, rudder = declared.aircraft, layout["main"][YAW]
@@ -125,10 +140,13 @@ def _slipstream_limits(declared: Declared, layout: np.void) -> tuple[float, floa
 
 @kernel
 def pitch_is_lost(layout, surfaces, saturated, shortfall):
-    """Whether elevator and flap are given up, or cannot between them give what pitch demands: the elevator is
-    given up or at its stop, and the shortfall is more than LEAST_LACK_RAD_S2.
+    """Whether pitch is lost. Either condition suffices:
 
-    A flap that can still act is asked for what the elevator lacks, so a lack says that it has nothing left.
+    - All surfaces of pitch are given up: the most that remains of elevators and of each backup is below
+      `least`.
+    - The elevator is given up or at its stop, and the shortfall in pitch exceeds LEAST_LACK_RAD_S2. The flap
+      is then asked for the rest of the demand, so a shortfall means that the flap has nothing to spare.
+
     shortfall (3,) rad/s2; saturated (n,).
     """
     effectiveness, elevator = surfaces.output.effectiveness, layout.main[PITCH]
@@ -143,10 +161,12 @@ def pitch_is_lost(layout, surfaces, saturated, shortfall):
 
 @kernel
 def engage(power, is_lost, t):
-    """Take over once pitch has been lost for a while, hand back once it has not been for longer. t s.
+    """Take over at t s once pitch has been lost for a while; hand back once it has not been lost for longer:
 
-    The hysteresis: `lost` rises by `impatience` in a frame in which pitch is lost and falls by `forgiveness`
-    in any other, between 0 and 1. Power takes over at 1 and hands back at 0; between them it stays as it is.
+        lost <- lost + impatience in a frame in which pitch is lost, else lost - forgiveness; within 0 to 1
+        engaged from lost = 1 on, until lost = 0
+
+    impatience: dt / patience_s; forgiveness: dt / release_s. theta_m begins at 0.
     """
     config, memory, output = power.config, power.memory, power.output
     change = config.impatience if is_lost else -config.forgiveness
@@ -176,12 +196,12 @@ def follow(config, memory, reference, x, y):
 
 @kernel
 def ceiling(power, y, highest_dpt):
-    """Highest manifold pressure (inHg) whose slipstream leaves the rudder enough to fly with; y (n_y,).
+    """Highest manifold pressure, inHg, whose slipstream leaves the rudder enough travel to fly with:
 
         P + (highest_dpt - dpt) / (d dpt / d P),    d dpt / d P = dpt_factor / (2 qdyn V)
 
-    The propeller yaws with dpt^3: slow and at full power, more than the rudder can hold. No limit where
-    nothing is known of a slipstream.
+    The propeller yaws with dpt^3. In slow flight at full power this is more than the rudder can hold. Without
+    a slipstream (dpt_factor 0) there is no limit.
     """
     if power.config.dpt_factor == 0.0:
         return np.inf
@@ -191,8 +211,8 @@ def ceiling(power, y, highest_dpt):
 
 @kernel
 def wanted(power, y):
-    """The law: P = base - K_V (V - V_bar) + K_theta theta_m, inHg, within its limits; `base`, P_trim or the
-    autopilot's, unless engaged."""
+    """The setting that the law wants, inHg: P = base - K_V (V - V_bar) + K_theta theta_m, within `ceiling`
+    and its range, while it is engaged; else `base`."""
     config, memory = power.config, power.memory
     P, V, V_bar, theta_m = power.setpoint.base, memory.speed, memory.usual_speed, memory.attitude
     if not memory.engaged:
@@ -203,9 +223,10 @@ def wanted(power, y):
 
 @kernel
 def steer_by_power(power, reference, x, y, may_engage, is_lost, t):
-    """Move the manifold pressure by one frame; x (3,) rad/s, y (n_y,), t s.
+    """Move the manifold pressure by one frame; x (3,) rad/s, t s.
 
-    may_engage: whether power may take over, since there is an alarm; is_lost: `pitch_is_lost` now.
+    may_engage: whether power may take over (after an alarm); is_lost: `pitch_is_lost` now. `moved` of the
+    memory keeps the levers in use after the law has handed back, until they are at `base` again.
     """
     memory, output = power.memory, power.output
     follow(power.config, memory, reference, x, y)
@@ -228,8 +249,8 @@ def moved(before, wanted, step):
 
 @kernel
 def follow_autopilot(power, setting, airspeed):
-    """Take the setting that the autopilot asks for, and the airspeed (m/s) to hold while power stands in for
-    a lost pitch: this law has an airspeed loop of its own."""
+    """Take the autopilot's setting as `base`, and its airspeed, m/s, as V_bar while this law is engaged: the
+    law has an airspeed loop of its own. If the law may not use the engine, move the lever to the setting."""
     power.output.in_use, power.setpoint.base = 1, setting
     if power.memory.engaged:
         power.memory.usual_speed = airspeed

@@ -1,10 +1,10 @@
 """Which type of fault is on a surface: exact feasible sets, frame by frame.
 
-The innovation nu = eta + G_s (p_s - u_s) and |eta| <= eta_bar put the surface's true deflection p_s of each
-frame in an interval, its axes agreeing on one (p: delta in docs/explanation/fault-types.md). A type is a
-statement about p_s that holds in every frame in which something is wrong; the set of its one parameter is
-the intersection over those frames, and the type is excluded when nothing is left. For a bound that holds
-instant by instant this is the exact feasible set: no test can exclude a type sooner without excluding a true
+The innovation nu = eta + G_s (p_s - u_s), with |eta| <= eta_bar, gives an interval of the surface's true
+deflection p_s in each frame, on which all axes agree (p is delta in docs/explanation/fault-types.md). A type
+is a statement about p_s that holds in every frame in which something is wrong. The set of its one parameter
+is the intersection over those frames, and the type is excluded when the set is empty. For a bound that holds
+instant by instant, this is the exact feasible set: a test that excludes a type sooner would exclude a true
 one at some time.
 
     loss            p = (1 + theta) u      1 + theta in [0, 1], constant
@@ -17,12 +17,12 @@ one at some time.
     rate limit      p moves to u only      at the slowest declared rate or faster
     growing bias    p = u + b              b of one sign and never smaller (incipient)
 
-A frame that eta alone explains gives no information: so a fault may be intermittent. The promise: the type,
-constant while it is there, is never excluded, and so never misnamed. What cannot be distinguished stays a
-candidate.
+A frame that eta alone explains gives no information, so a fault may be intermittent. The promise: the type of
+the true fault, if its parameter is constant while it is there, is never excluded, and so no other type is
+named. Types that cannot be distinguished stay candidates.
 
-A file under table/ describes fault types; its `TYPES` are the rows. This file says what is in a row
-(`FaultType`) and has two parts of a surface's record:
+A file under table/ describes one fault type, or several that share their kernels; its `TYPES` are the rows.
+This file says what is in a row (`FaultType`) and has two parts of a surface's record:
 
 - Feasible sets: the set (low, high) of each type's parameter; low > high is the empty set. A type is excluded
   once its set is empty, and stays excluded until the surface's diagnosis restarts.
@@ -30,7 +30,8 @@ A file under table/ describes fault types; its `TYPES` are the rows. This file s
   `last` is of the elapsed frame, `judged` of the one before it, `earlier` of the one before that; rad.
 
 registry.py reads the rows into arrays, and records.py has the records. In each frame examination.py finds
-where each surface was and tests every type. verdict.py and pairs.py conclude; they name no type.
+where each surface was and tests every type. verdict.py and pairs.py conclude which surface and type it is,
+modes.py what the law does about it, and findings.py puts it in words; they name no type.
 
     s, srf          surface, and its record (`records.surface_types_dtype`)
     h               type: its number, the same in every array over types
@@ -39,7 +40,8 @@ where each surface was and tests every type. verdict.py and pairs.py conclude; t
     lo, hi          interval, rad
     nu, nu_max (3,) innovation and its bound without a fault, rad/s2
     c, M            TYPES_CONFIG_RECORD of records.py, memory of a type
-    est, fie, eff   estimators of the isolation, one of them, what it supposes of the frame (EFFECT_RECORD)
+    est, fie        estimators of the isolation, and one of them
+    eff             effect of the fault of an estimator in the frame (EFFECT_RECORD of isolation.py)
 """
 
 from collections.abc import Callable
@@ -54,26 +56,26 @@ from beaver_ftc.diagnosis.sets import EMPTY_SET, UNLIMITED_SET, intersect
 
 Kernel = Callable[..., Any]
 
-# Accommodation modes, what the law does about a surface at fault: scale its command, give the surface up,
-# subtract its offset, or wait for it at the rate that it has.
+# Accommodation modes: the law scales the command of a surface at fault, gives the surface up, subtracts its
+# offset, or waits for it at its rate.
 SCALE_COMMAND, GIVE_UP, SUBTRACT_OFFSET, WAIT_FOR_SURFACE = range(4)
 
-# `evidence_at_rest`: what a surface says of a type that was given up, stays where it was and shows nothing
-# wrong.
+# `evidence_at_rest`: what a frame says of a type if the surface was given up, stays where it was, and nothing
+# is wrong in the frame.
 REST_IS_UNINFORMATIVE, REST_EXCLUDES_TYPE, REST_HIDES_TYPE, REST_POSITION_IS_PARAMETER = range(4)
 
 
 @kernel
 def reachable_range(c, srf, h, k):
-    """Anywhere within reach."""
+    """Anywhere within the reach of the surface, rad: the range of a type that says nothing more."""
     return srf.actuator.reach_lo, srf.actuator.reach_hi
 
 
 class DeflectionRelation(NamedTuple):
-    """The deflection p of a surface under a type, by its command u and one parameter theta, all in rad:
+    """The deflection p, rad, of a surface under a type, by its command u, rad, and one parameter theta:
 
-    p = command_gain u + theta, or p = (command_gain + theta) u where theta is a share of the command
-    (theta_is_share).
+        p = command_gain u + theta         theta in rad
+        p = (command_gain + theta) u       if theta_is_share: theta without unit
 
     theta_span(low, high): returns the least and greatest theta; low, high: the travel, rad.
     """
@@ -202,33 +204,34 @@ def clip_travel(srf, p):
 
 @kernel
 def set_middle(srf, h):
-    """The middle of a type's set."""
+    """The middle of the set of type h, in the unit of its parameter."""
     return 0.5 * (srf.sets.low[h] + srf.sets.high[h])
 
 
 def feasible_set(fdi: np.void, s: int, h: int) -> tuple[float, float]:
-    """The set of a type's parameter on surface s."""
+    """The set (low, high) of the parameter of type h on surface s."""
     srf = fdi["types"]["surface"][s]
     return float(srf["sets"]["low"][h]), float(srf["sets"]["high"][h])
 
 
 def middle_estimate(fdi: np.void, s: int, h: int) -> float:
-    """The middle of the feasible set of a type's parameter on surface s."""
+    """The middle of the set of the parameter of type h on surface s."""
     lo, hi = feasible_set(fdi, s, h)
     return 0.5 * (lo + hi)
 
 
 @kernel
 def put_set(srf, h, interval):
-    """Put an interval in place of the set of a type."""
+    """Put an interval in place of the set of type h."""
     srf.sets.low[h], srf.sets.high[h] = interval
 
 
 @kernel
 def intersect_set(srf, h, other):
-    """Keep of the set of a type what is also in `other`; exclude the type when nothing is left. The set then
-    holds the two bounds that contradict each other. EMPTY_SET has no such bounds: a type that it excludes
-    keeps its set.
+    """Intersect the set of type h with `other`, (low, high); exclude the type if the result is empty.
+
+    The set of an excluded type then has the two bounds that contradict each other. EMPTY_SET has no such
+    bounds: a type that it excludes keeps its set.
     """
     if other == EMPTY_SET:
         srf.sets.excluded[h] = 1
@@ -238,54 +241,58 @@ def intersect_set(srf, h, other):
         srf.sets.excluded[h] = 1
 
 
-# u: where a healthy surface was, rad; lo, hi: where this one can have been, rad; anomalous: whether more than
-# the declared uncertainty was at work; kappa: (G_max - G_min) / (4 |mean G|), by so much of the range of its
-# positions a mean weighted by G may be off; hides: whether the lower and the upper stop can cut a deflection
-# off unseen.
+# An observation of a surface in a frame:
+# u           where a healthy surface was, rad
+# lo, hi      where this one can have been, rad
+# anomalous   whether more than the declared uncertainty must explain the frame
+# kappa       (G_max - G_min) / (4 |mean G|): a mean weighted by G may be off by kappa times the range of p
+# hides       whether the lower and the upper stop can cut off a deflection without this being visible
 OBSERVATION_RECORD = record(u=float, lo=float, hi=float, anomalous=int, kappa=float, hides=(int, 2))
 
 
 @kernel
-def copy_observation(to, of):
-    """Copy one observation to another."""
-    (to.u, to.lo, to.hi, to.anomalous, to.kappa) = (of.u, of.lo, of.hi, of.anomalous, of.kappa)
-    to.hides[:] = of.hides
+def copy_observation(new, old):
+    """Copy the observation `old` into `new`."""
+    (new.u, new.lo, new.hi, new.anomalous, new.kappa) = (old.u, old.lo, old.hi, old.anomalous, old.kappa)
+    new.hides[:] = old.hides
 
 
 @kernel
 def set_anomalous(srf, anomalous):
-    """Say of the last observation of a surface whether more than the declared uncertainty was at work."""
+    """Set `anomalous` of the last observation of a surface."""
     srf.last.anomalous = anomalous
 
 
 @kernel
 def forget_anomalies(srf):
-    """Nothing but the declared uncertainty was at work in what is kept of a surface."""
+    """Set that the declared uncertainty explains all three observations of a surface."""
     srf.last.anomalous = srf.judged.anomalous = srf.earlier.anomalous = 0
 
 
 @kernel
 def observe_surface(c, srf, fie, m, nu, nu_max, eff):
-    """Find where a surface can have been: the interval of the deflections p, rad, with
+    """Fill `last`: where a healthy surface was, u = -h_m / Z_m, and where this one can have been, the
+    interval of the deflections p, rad, with
 
-        |nu - G (p - u)| <= nu_max        on every axis; over a block on axis m alone
+        |nu - G (p - u)| <= nu_max + r        on every axis; over a block on axis m alone
 
     from the innovation nu = eta + G (p - u) and |eta| <= nu_max, (3,) rad/s2. m: the axis on which the
-    surface has most effect; eff: Z = G, rad/s2 per rad, h = -G u, rad/s2, tolerance r, rad/s2; fie: its
-    estimator.
+    surface has most effect; eff: Z = G, rad/s2 per rad, h = -G u, rad/s2, tolerance r, rad/s2; fie: the
+    estimator of its position. Over a block the axes weigh a varying position differently, so that they need
+    not agree on its mean.
     """
     last, cmd = srf.last, srf.commands
     last.u = -eff.h[m] / eff.Z[m]
     last.kappa = 0.25 * (cmd.G_max - cmd.G_min) / abs(eff.Z[m])
-    axis = m if c.frames_per_block > 1 else -1  # over a block the axes weigh what varies differently
+    axis = m if c.frames_per_block > 1 else -1
     last.lo, last.hi = isolation.consistent_on_axes(nu, nu_max, fie, eff, axis)
     mark_stops(srf, 2.0 * (nu_max[m] + eff.r[m]) / abs(eff.Z[m]))
 
 
 @kernel
 def mark_stops(srf, width):
-    """Which stops can cut a deflection off unseen: those nearer to a healthy surface than `width` (rad) of
-    the interval which holds the true deflection.
+    """Fill `hides`: a stop can cut off a deflection without this being visible if it is nearer to a healthy
+    surface than the width, rad, of the interval of the true deflection.
     """
     srf.last.hides[0] = srf.commands.u_min[0] - srf.actuator.stop_lo < width
     srf.last.hides[1] = srf.actuator.stop_hi - srf.commands.u_max[0] < width
@@ -293,8 +300,12 @@ def mark_stops(srf, width):
 
 @kernel
 def observe_error(srf, e, tol):
-    """A surface was off its command by e +- tol, rad: p in [u + e - tol, u + e + tol] within its reach.
-    Returns whether any is."""
+    """Fill `last` of a surface that was off its command by e +- tol, rad:
+
+        p in [u + e - tol, u + e + tol] within its reach,    anomalous if |e| > tol
+
+    Returns whether there is such a p.
+    """
     last, act = srf.last, srf.actuator
     last.lo = max(act.reach_lo, last.u + e - tol)
     last.hi = min(act.reach_hi, last.u + e + tol)
@@ -311,5 +322,5 @@ def judged_error(srf):
 
 @kernel
 def last_error(srf):
-    """p - u in the elapsed frame, rad, p in the middle of where it can have been."""
+    """p - u in the elapsed frame, rad, with p in the middle of its interval."""
     return 0.5 * (srf.last.lo + srf.last.hi) - srf.last.u

@@ -1,8 +1,8 @@
 """The examination of a frame by every fault type.
 
 In each frame, or block of frames: where was each surface, and was anything wrong? A frame is judged one frame
-later: in a frame of several JSBSim steps a fault may begin or end within the frame, which then shows a part
-of it; such a frame, next to a healthy one, is skipped.
+later. In a frame of several JSBSim steps, a fault may begin or end within the frame, which then shows only a
+part of the fault. Such a frame, next to a healthy one, is skipped.
 
 Where the noise of a gyro makes single frames uninformative, frames are examined in blocks. Summed over a
 block the innovation holds the noise of its two ends alone, n[k+N] - n[k]. So the mean over N frames has the
@@ -15,7 +15,8 @@ mean of a constant position, offset or effectiveness is exact; that of a varying
 extremes. To the types a block is like a frame of several JSBSim steps: a block next to a healthy one is
 skipped.
 
-types: of `fault_types_dtype`. estimators: those of the isolation, by the layout. bound: of `bound_dtype`.
+types: of `fault_types_dtype`. est: the estimators of the isolation; the layout has their numbers. bound: of
+`bound_dtype`. Other symbols: types/__init__.py.
 """
 
 import numpy as np
@@ -50,14 +51,14 @@ from beaver_ftc.diagnosis.types.registry import (
 
 @kernel
 def restart_types(types):
-    """Nothing is known of any surface yet."""
+    """Restart the diagnosis of all surfaces, with no knowledge."""
     for srf in types.surface:
         restart_surface(srf)
 
 
 @kernel
 def restart_surface(srf):
-    """Nothing is known of this surface yet."""
+    """Restart the diagnosis of one surface, with no knowledge: every type remains, with its whole range."""
     srf.sets.excluded[:] = 0
     srf.last.lo, srf.last.hi = srf.actuator.reach_lo, srf.actuator.reach_hi
     ev = srf.evidence
@@ -70,8 +71,8 @@ def restart_surface(srf):
 
 @kernel
 def record_commands(types, commands, ext):
-    """Add a frame to the commands (n,) rad of the surfaces; with the first frame of a block, the record moves
-    on by a block.
+    """Add a frame to the record of the commands (n,) rad. With the first frame of a block, the record moves
+    on by a block: index 1 is then the block before.
 
     cmd: command of a surface, limited by its stops, rad. ext: of a `model_prediction.frame_means_dtype`: the
     extremes, within the frame, of u, where a healthy surface was, rad, and of G, rad/s2 per rad.

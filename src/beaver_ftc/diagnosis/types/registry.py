@@ -1,6 +1,6 @@
-"""The rows of the fault types as arrays.
+"""The rows of the fault types as arrays, and their kernels as one kernel for each slot.
 
-Every file under `table/` is read, in the order of its name: a new type is one more row.
+Every file under `table/` is read: a new type is one more row. The number h of a type is its place in TYPES.
 """
 
 import pkgutil
@@ -15,7 +15,8 @@ from beaver_ftc.diagnosis.types import REST_HIDES_TYPE, FaultType, Kernel, table
 
 
 def _load_types() -> tuple[FaultType, ...]:
-    """Those of a constant parameter first, then by rank: a type's number is its place."""
+    """The rows of all files: types with a constant parameter first, then by rank and name. Kernels rely on
+    this order: the constant types are 0 to N_CONSTANT - 1."""
     names = sorted(f"{table.__name__}.{info.name}" for info in pkgutil.iter_modules(table.__path__))
     rows = [row for name in names for row in import_module(name).TYPES]
     return tuple(sorted(rows, key=lambda row: (not row.has_constant_parameter, row.sort_rank, row.name)))
@@ -35,12 +36,12 @@ def _type_column(name: str) -> np.ndarray:
 
 
 def _parts_of(name: str) -> dict[int, Kernel]:
-    """This part of each type that has it."""
+    """The part `name` of each type h that has it: h -> part."""
     parts = {h: getattr(row, name) for h, row in enumerate(TYPES)}
     return {h: part for h, part in parts.items() if part is not None}
 
 
-# The columns that verdict.py reads; `FaultType` says what they are.
+# Columns of the table, by type; `FaultType` says what they are.
 MODE, STOP_SIDE, REST, HOLDS = (
     _type_column(name)
     for name in ("accommodation_mode", "stop_direction", "evidence_at_rest", "holds_surface")
@@ -53,20 +54,24 @@ CAN_LOOK_LIKE = np.array([[other.name in row.can_look_like for other in TYPES] f
 SERVES = np.array(
     [[mode in (row.accommodation_mode, *row.other_accommodation_modes) for row in TYPES] for mode in range(4)]
 )
-# Masks of types (N_TYPES,): all, those of a constant parameter, others; of these, those that must show
-# themselves and those that need not; those of one mode, and those that can look like one type.
+# Masks of types (N_TYPES,): all; with a constant parameter, and varying ones; of the varying ones, those that
+# must show themselves, and the quiet ones, which need not; of one mode, VARYING_OF_MODE[mode]; those that can
+# look like type h, VARYING_LIKE[h].
 ALL, CONSTANT = np.ones(N_TYPES, bool), np.arange(N_TYPES) < N_CONSTANT
 VARYING = ~CONSTANT
 VARYING_SHOWN, VARYING_QUIET = VARYING & MUST_SHOW, VARYING & ~MUST_SHOW
 VARYING_OF_MODE = VARYING & (np.arange(4)[:, None] == MODE)
 VARYING_LIKE = VARYING & CAN_LOOK_LIKE.T
 HIDDEN_AT_REST = REST == REST_HIDES_TYPE
-# The same of one name, by the first type of it; of any name, by TYPE_UNDECIDED (-1)
+# NAMED[h]: mask of the types that have the name of type h, if h is the first of them; NAMED[-1], the last
+# row, which the number TYPE_UNDECIDED (-1) selects: all types.
 NAMED = np.array([*(np.array(SAME_NAME) == h for h in range(N_TYPES)), ALL])
-# Types that give the deflection error of a surface, in the order in which they are used.
+# Types that can give the deflection error of a surface, in the order of their precedence.
 ERROR_TYPES = np.array(
     sorted(_parts_of("deflection_error"), key=lambda h: TYPES[h].deflection_error_precedence), dtype=int
 )
+# SERVES[mode, h]: whether a mode serves type h; END_TYPE[h]: the type that h becomes at the end of its range,
+# -1 for none.
 END_TYPE = np.array([TYPE_NAMES.index(row.end_type) if row.end_type else -1 for row in TYPES])
 
 

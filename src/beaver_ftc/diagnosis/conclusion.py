@@ -1,12 +1,21 @@
 """The conclusion about the surfaces, and the assessment of each surface that the laws read.
 
-The conclusion holds the alarm, surface and type of the fault, and the surface on which the law acts. The
-stages of the diagnosis return their findings: a detector the axis of its alarm, the isolation the estimator
-that is left, the fault types a surface with its type, a monitor whether the cause is no surface. The schemes
-(schemes/) hand each of them to a kernel of this file, and no other file writes the conclusion.
+*Conclusion* (`found`): the alarm, surface and type of the fault, and the surface on which the law acts. The
+stages of the diagnosis return their findings, and the schemes (schemes/) hand each of them to a kernel of
+this file, which alone writes the conclusion:
 
-The assessment holds effectiveness, offset and lag of each surface, by whichever stage estimates them. It is
-the output of the diagnosis. No other file writes it.
+    a detector        the axis of its alarm
+    the isolation     the only remaining estimator
+    the fault types   a surface with its type
+    a monitor         that the cause is no surface
+
+*Assessment* (`out`): effectiveness, offset and lag of each surface, by the stage that estimates them. It is
+the output of the diagnosis, and only this file writes it.
+
+    cfg           SHARED_CONFIG_RECORD
+    types         record of `fault_types_dtype`; surf: that of one surface
+    fies          isolation estimators; layout: their numbers, by surface
+    s, t          surface; time, s
 """
 
 import numpy as np
@@ -28,10 +37,11 @@ from beaver_ftc.diagnosis.types import (
 MAX_WITHDRAWN = 16
 
 # Why an isolation is withdrawn: an estimator refutes the surface, all types are excluded on it, a sensor is
-# found broken, a plug-in says so; or none of these, and it is one of several that are possible.
+# found broken, a plug-in decides so; or for none of these reasons, if another surface has become possible
+# too.
 SURFACE_REFUTED, TYPES_REFUTED, SENSOR_BROKEN, PLUGIN_DECIDES, SEVERAL_POSSIBLE = range(5)
 
-# An isolation that was withdrawn, or the type of one: surface and type, -1 if open, from when to when, s.
+# An isolation that was withdrawn, or the type of one: surface; type, -1 if open; its beginning and end, s.
 WITHDRAWN_RECORD = record(surface=int, fault_type=int, from_s=float, to_s=float, reason=int)
 
 
@@ -51,7 +61,7 @@ def conclusion_dtype(n: int) -> np.dtype:
     isolated_type, type_from_s: its type, -1 if open, and since when. Types of one name have one number here,
     that of the first (SAME_NAME of types/registry.py).
 
-    Isolations that were withdrawn, and how many there were:
+    Isolations that were withdrawn, the first ones and the last, and how many there were:
     gone, n_gone: surfaces
     withdrawn_types, n_gone_types: types of surfaces that stayed isolated
     """
@@ -64,7 +74,7 @@ def conclusion_dtype(n: int) -> np.dtype:
 
 
 def reset_conclusion(found: np.void) -> None:
-    """Fill the record of a diagnosis that has concluded nothing."""
+    """Fill the conclusion of a diagnosis that has found nothing yet."""
     fill(
         found, detected_at_s=-1.0, isolated_estimator=NOT_ISOLATED, isolated_at_s=-1.0, fault_type=-1,
         typed_at_s=-1.0, target=-1, accommodation_mode=-1, from_s=-1.0, isolated_type=-1, type_from_s=-1.0,
@@ -73,14 +83,15 @@ def reset_conclusion(found: np.void) -> None:
 
 @kernel
 def latch_alarm(found, axis, t):
-    """Latch an alarm at t s on an axis: only the first alarm is recorded."""
+    """Latch an alarm at t s on an axis. Only the first alarm is recorded."""
     if not found.detected:
         found.detected, found.detected_at_s, found.axis = 1, t, axis
 
 
 @kernel
 def set_isolated(found, j, t):
-    """Replace the isolated fault; if it is another one, its time of isolation becomes t s."""
+    """Replace the isolated fault by that of estimator j, or by NOT_ISOLATED or UNANTICIPATED; if this is a
+    change, the time of isolation becomes t s."""
     if j != found.isolated_estimator:
         found.isolated_estimator, found.isolated_at_s = j, t
 
@@ -120,8 +131,8 @@ def withdraw_conclusion(found):
 
 @kernel
 def update_interval(found, s, isolated, t, kind, reason):
-    """Record at t s whether surface s is isolated, and of which type `kind` (-1 if open); store what ends
-    with this frame, and why: the isolation, or, while it goes on, its type.
+    """Record at t s whether surface s is isolated, and its type `kind` (-1 if open). If the isolation ends
+    with this frame, store it with the reason; if it continues and its type ends, store the type.
     """
     isolated_since, old_type = found.from_s[s], found.isolated_type[s]
     if isolated and isolated_since < 0.0:
@@ -140,11 +151,11 @@ def update_interval(found, s, isolated, t, kind, reason):
 
 @kernel
 def store_withdrawn(store, n, s, kind, from_s, to_s, reason):
-    """Fill the next record of a store (MAX_WITHDRAWN,), whose n records are filled, or the last if it is
-    full; return how many there were, n + 1."""
-    gone = store[min(n, MAX_WITHDRAWN - 1)]
-    gone.surface, gone.fault_type, gone.reason = s, kind, reason
-    gone.from_s, gone.to_s = from_s, to_s
+    """Fill the next record of a store (MAX_WITHDRAWN,) in which n records are filled, or its last record if
+    it is full; return the number of withdrawals so far, n + 1."""
+    entry = store[min(n, MAX_WITHDRAWN - 1)]
+    entry.surface, entry.fault_type, entry.reason = s, kind, reason
+    entry.from_s, entry.to_s = from_s, to_s
     return n + 1
 
 
@@ -154,7 +165,7 @@ def isolated_surface(found, fies):
     return fies[found.isolated_estimator].surface if found.isolated_estimator >= 0 else -1
 
 
-# 1 / variance of an effectiveness that is known to 0.05: it is precise enough to be applied at once
+# 1 / variance of an effectiveness with a standard deviation of 0.05: precise enough to be applied at once
 MIN_INFORMATION = 400.0
 
 
@@ -162,12 +173,18 @@ MIN_INFORMATION = 400.0
 def assessment_dtype(n: int) -> np.dtype:
     """The assessment of n surfaces.
 
-    detected: a fault; no_target: true without a fault as well; isolated_surface: -1 for none. lags: a surface
-    follows its command late. accommodation_mode: of each surface, -1 where open, or where faults of every
-    type are not diagnosed; effectiveness; at_once: whether the law applies it at once, not gradually; offset,
-    lag rad. unknown_acceleration (3,) rad/s2: explained by no known fault. pitch_undecided: the main surface
-    of pitch may be at fault, and it has long been open. held: the surfaces are assessed as before a sensor
-    broke.
+    detected                  whether there is an alarm
+    no_target                 whether the law acts on no surface; true without a fault as well
+    diagnoses_all_types       whether faults of every type are diagnosed
+    isolated_surface          -1 for none
+    lags                      whether a surface follows its command late
+    accommodation_mode (n,)   -1 while open, or unless faults of every type are diagnosed
+    effectiveness (n,)        0 to 1
+    at_once (n,)              whether the law applies the effectiveness at once, not gradually
+    offset, lag (n,)          rad
+    unknown_acceleration (3,) rad/s2, explained by no known fault
+    pitch_undecided           whether the main surface of pitch may be at fault, and this has long been open
+    held                      whether the surfaces are assessed as before a sensor broke
     """
     return record(
         detected=int, no_target=int, diagnoses_all_types=int, isolated_surface=int, lags=int,
@@ -178,7 +195,13 @@ def assessment_dtype(n: int) -> np.dtype:
 
 @kernel
 def assess_surfaces(out, cfg, found, types, layout, fies, stat):
-    """Fill the assessment of this frame from the outputs of the stages; stat: of `statistical_dtype`.
+    """Fill the assessment of this frame from the outputs of the stages; stat: of `statistical_dtype`. The
+    effectiveness of a surface, and what goes with it, comes from the first source that applies:
+
+        a plug-in estimates effectiveness, after its alarm     the plug-in
+        the fault types have set a mode for the surface        `assess_surface`
+        the surface is isolated by its loss estimator          `isolated_theta`
+        otherwise                                              1, no offset, no lag
 
     The law has no target if no surface is isolated or accommodated, and no plug-in estimates effectiveness.
     """
@@ -202,9 +225,9 @@ def assess_surfaces(out, cfg, found, types, layout, fies, stat):
 
 @kernel
 def hold_assessment(out, types):
-    """Go on with the assessment from before a sensor broke: effectiveness, and offsets of constant faults.
+    """Keep the assessment from before a sensor broke: effectiveness, and offsets of constant faults.
 
-    What varies from frame to frame cannot be estimated without the sensor, and is taken for zero.
+    Lags, and offsets that vary from frame to frame, cannot be estimated without the sensor, and become zero.
     """
     out.held, out.lags, out.lag[:] = 1, 0, 0.0
     for s, surf in enumerate(types.surface):
@@ -214,7 +237,13 @@ def hold_assessment(out, types):
 
 @kernel
 def assess_surface(out, types, layout, fies, s):
-    """Fill the assessment of surface s, which the diagnosis of every type accommodates."""
+    """Fill the assessment of surface s by its mode of accommodation (types/modes.py):
+
+    SCALE_COMMAND       effectiveness
+    GIVE_UP             effectiveness 0 at once; offset: its deflection, rad
+    SUBTRACT_OFFSET     offset: its deflection error, rad
+    WAIT_FOR_SURFACE    lag: its deflection error in the last frame, rad
+    """
     surf = types.surface[s]
     possible = verdict.can_be_faulty(surf)
     mode = surf.accommodation.mode
@@ -232,10 +261,10 @@ def assess_surface(out, types, layout, fies, s):
 
 @kernel
 def isolated_theta(cfg, found, layout, fies, stat, s):
-    """The estimated theta of the isolated loss of surface s, and one over its variance.
+    """The estimated theta of the isolated loss of surface s, and its information, 1 / variance.
 
     The statistical detector gives the most likely theta. If its estimates are not used, theta is that of the
-    loss's estimator, whose variance is not known: 0 stands for one over it.
+    isolation estimator, whose variance is not known: its information is 0.
     """
     if weighs_statistics(stat, cfg.authority):
         return statistical.estimate_loss(stat.block, s)

@@ -1,13 +1,18 @@
 """Our scheme: it detects by the bank of filters and the statistical detector, and isolates by fault class.
 
-The acceleration by known faults is part of the prediction, so the estimator of the unknown explains the rest.
-The verdict of a Python plug-in replaces ours; our estimators run on, because the laws use them.
+The acceleration by known faults is part of the prediction, so the estimator of the unknown (FDAE) explains
+the rest. The verdict of a Python plug-in replaces ours; our estimators go on, because the laws use them.
 
 The isolation depends on the fault class, and on the detectors whose exclusions count (`exclusion_authority`):
 
-    class        of the bank of estimators excludes  and decides
-    published    worst case, likelihoods, or either  the estimator that is left: a loss of one surface
+    class        what excludes a fault                what is decided
+    published    worst case, likelihoods, or either   the only remaining estimator: a loss of one surface
     all          worst case, or parity views as well  the type of a fault on each surface, alone or in pairs
+
+    fdi             record of `schemes.fdi_dtype`
+    pred, meas      prediction of the design model, readings of the sensors
+    j, fie          estimator: its number, its record
+    k, t            number of the frame; its time, s
 """
 
 from beaver_ftc.compiled import apart, kernel
@@ -35,9 +40,9 @@ def update_filters(fdi, pred, meas):
 
 @kernel
 def update_estimators(fdi, pred):
-    """Bring the isolation estimators from the frame before to this one, once the bank has its innovation.
+    """Bring the isolation estimators from the frame before to this one; the bank must have its innovation.
 
-    With a broken sensor they stay as they are: the reading in its place follows from the design model.
+    With a broken sensor they stay as they are: the reading that replaces it follows from the design model.
     """
     cfg, iso, bound, means, detected = fdi.config, fdi.isolation, fdi.bound, pred.means, fdi.verdict.detected
     isolation.update_effects(iso, fdi.bank, bound, cfg, detected, means.G, means.Gu, means.e_Gu)
@@ -47,7 +52,8 @@ def update_estimators(fdi, pred):
 
 @kernel
 def follow_alarm(fdi, meas, axis, t):
-    """Latch an alarm on an axis, or -1 for none, at t s; from the first alarm on, isolate its cause."""
+    """Latch an alarm at t s on an axis (-1: no alarm in this frame). From the first alarm on, isolate its
+    cause."""
     before = fdi.verdict.detected
     if axis >= 0:
         conclusion.latch_alarm(fdi.verdict, axis, t)
@@ -57,7 +63,7 @@ def follow_alarm(fdi, meas, axis, t):
 
 @kernel
 def continue_isolation(fdi, meas, t, before):
-    """From the alarm on, exclude faults and decide; before: the alarm came a frame or more ago.
+    """From the alarm on, exclude faults and decide; before: whether the alarm came a frame or more ago.
 
     Where sensors are monitored, the isolation starts one frame after the alarm, because the attitude reveals
     a gyro fault one frame late (later where it is noisy). With a broken sensor or engine nothing is isolated.
@@ -95,9 +101,9 @@ def weigh_position(fdi, j):
 def exclude_or_wait(fdi, fie, possible, t):
     """Exclude the fault of estimator fie at t s, unless it is possible.
 
-    Where sensors are monitored, a fault that has been isolated is excluded a frame later: it may be a gyro
-    that contradicts it, and the attitude shows that a frame late. While a gyro may be the cause of the alarm,
-    what excludes a fault is only kept.
+    Where sensors are monitored, a fault that has been isolated is excluded a frame later: a broken gyro may
+    have contradicted it, and the attitude reveals the gyro a frame late. While a gyro may be the cause of the
+    alarm, an exclusion is only pending.
     """
     if not possible or fie.pending:
         monitor, isolated = fdi.sensor_monitor, fdi.verdict.from_s[fie.surface] >= 0.0
@@ -107,7 +113,8 @@ def exclude_or_wait(fdi, fie, possible, t):
 
 @kernel
 def isolate(fdi, meas, t, started):
-    """Exclude faults at t s, and decide; started: the isolation started a frame or more ago."""
+    """Exclude faults at t s, and decide; started: whether the isolation started a frame or more ago. While a
+    gyro may be the cause of the alarm, nothing is decided."""
     cfg, iso, bank = fdi.config, fdi.isolation, fdi.bank
     for j, fie in enumerate(iso.estimator[: iso.config.n_estimators]):
         possible = isolation.fault_possible(iso, fie, bank, fdi.bound.nu_max, cfg.abrupt, meas.x, started)
@@ -127,7 +134,7 @@ def isolate(fdi, meas, t, started):
 
 @apart
 def decide_type(fdi, t, started):
-    """Decide which fault of every type, alone or two at a time, is there."""
+    """Decide on which surface, or two of them, there is a fault, and of which type."""
     types, found, layout, bank = fdi.types, fdi.verdict, fdi.layout, fdi.bank
     fies, bound = fdi.isolation.estimator, fdi.bound
     verdict.record_exclusions(types.surface, layout, fies)
@@ -180,9 +187,9 @@ def fill_rows(fdi, prediction, y):
     """Finish the gust estimates of the elapsed frame, and fill the rows that blocks and views read."""
     stat, means, nu = fdi.statistical, prediction.means, fdi.bank.output.innovation
     gusts.finish_gust(stat.gust, prediction.w)
-    for own in (stat.vaneless, stat.vaned):
-        if own.output.gusty:
-            gusts.finish_gust(own, prediction.w)
+    for gust in (stat.vaneless, stat.vaned):
+        if gust.output.gusty:
+            gusts.finish_gust(gust, prediction.w)
     fill_old_effects(means)
     alpha_cubed = unanticipated_pitch(prediction.design, y, 1.0)
     finish_rows(
@@ -193,7 +200,8 @@ def fill_rows(fdi, prediction, y):
 
 @kernel
 def compare_attitude(fdi, x):
-    """Compare the turn of the attitude with the rates x; if both turn, no gyro is the cause of the alarm."""
+    """Compare the turn of the attitude with the measured rates x, rad/s. After an alarm, if the attitude
+    turns as well (score above 1), no gyro is the cause."""
     stat, att, detected = fdi.statistical, fdi.statistical.attitude, fdi.verdict.detected
     attitude.compare_attitude(att, stat.block, stat.rows.eta[0, :3], x, fdi.config.dt, detected)
     if detected and att.score > 1.0:
@@ -217,8 +225,8 @@ def add_gust_instant(fdi, prediction, measured):
 
 @kernel
 def update_gusts(stat, du, pred, meas, k, dt):
-    """Update the gust estimates, and the rows of the forces; without inertial readings to trust, stop using
-    accelerometers. du (n,) rad: errors of the deflections."""
+    """Update the gust estimates, and the rows of the forces. If the inertial readings cannot be trusted, stop
+    using accelerometers. du (n,) rad: errors of the deflections. k: number of the frame; dt s."""
     gust, vaneless, vaned, force = stat.gust, stat.vaneless, stat.vaned, stat.forces
     if gust.output.gusty:
         gusts.set_intensity(gust, meas.altitude)

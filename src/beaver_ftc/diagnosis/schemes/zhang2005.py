@@ -8,13 +8,20 @@
     thresholds   mu_i^s = k_i^s |Om_i^s| + int_Td^t e^{-lam (t-tau)} eta_bar_i dtau + e^{-lam (t-Td)} w_i
     isolation    s is excluded once |eps_i^s| > mu_i^s, some i; the one left is the fault; none: not isolable
 
+    x, xhat0, xhats    rad/s     measured rates; states of the FDAE and of FIE s
+    f + G u            rad/s2    acceleration of the design model
+    fhat, fhats        rad/s2    network of the FDAE; effect of the fault of FIE s
+    th0, ths           weights of the network; loss parameter
+    eps0, epss         rad/s     residuals; ebar, mu: their thresholds
+    lam                1/s       pole of the filter, an element of Lambda
+    k_i^s              1         largest distance between theta and its estimate
+
 The estimators are those of detection/filters.py and isolation.py, whose residuals and thresholds these are.
 This file has the differences: Euler steps, a network of (x, u) (detection/state_network.py), gradients
-instead of least squares, and no alarm but the FDAE's. D[eps] is 0 while the residuals of all axes are within
-their thresholds, and the whole of eps otherwise [Zhang2002]. w is 0, since xhats(Td) =
-x(Td); with noisy gyros w is the bound on their noise. What the paper leaves open is an option (plugins.yaml
-lists them, with how each was chosen); some options remove a part of the scheme, to measure the effect of that
-part.
+instead of least squares, and alarms by the FDAE alone. D[eps] is 0 while the residuals of all axes are within
+their thresholds, and the whole of eps otherwise [Zhang2002]. w is 0, since xhats(Td) = x(Td); with noisy
+gyros w is the bound on their noise. Where the paper leaves a choice open, it is an option (plugins.yaml lists
+the options, and how each was chosen). Some options remove a part of the scheme, to measure its effect.
 """
 
 import numpy as np
@@ -39,7 +46,8 @@ PUBLISHED_RECORD = record(config=record(waits=int, mu0=float), network=STATE_NET
 
 
 def reconfigure(fdi: np.void, declared: Declared, travel: np.ndarray) -> None:
-    """Turn the stages of a diagnosis, filled in already, into this scheme; travel (2, n) rad: the stops."""
+    """Turn the stages of a diagnosis, which are filled in already, into this scheme, with its options; travel
+    (2, n) rad: the stops."""
     config, dt = declared.fdi, 1.0 / declared.rate_hz
     options = settings(DETECTORS, config.scheme, config.options)
     scheme, isolation = fdi["published"], fdi["isolation"]
@@ -66,10 +74,9 @@ def euler_decay(lam: float, dt_s: float) -> float:
 
 @kernel
 def train_if_due(pub, fdae, detected, dt):
-    """The FDAE's network learns once a fault is detected, in frames with a residual outside its threshold.
-
-    The residual of one axis is enough for the networks of all three to learn. Without the dead zone they
-    learn from the first frame on, from any residual.
+    """Train the network of the FDAE, with the dead zone D only after detection and in frames in which the
+    residual of some axis is outside its threshold. Without the dead zone (`waits` is 0), train it in every
+    frame. One axis is enough for all three axes to learn.
     """
     if not pub.config.waits or (detected and fdae_axis(fdae) >= 0):
         train_state_network(pub.network, fdae.output.residual, dt)
@@ -86,7 +93,8 @@ def fdae_axis(fdae):
 
 @apart
 def advance_estimators_to_frame(fdi, prediction, measured):
-    """Bring isolation, FDAE and its network to this frame."""
+    """Bring isolation, FDAE and its network to this frame. A constant threshold mu0 > 0 then replaces all
+    adaptive ones."""
     pub, dt, mu = fdi.published, fdi.config.dt, fdi.published.config.mu0
     adaptive_estimators.update_filters(fdi, prediction, measured)
     adaptive_estimators.update_estimators(fdi, prediction)

@@ -1,4 +1,4 @@
-"""Rival detectors and laws, each after its source, plugged in as anybody's would be.
+"""Rival detectors and laws, each after its source, plugged in as those of a third party are.
 
     rls-monitor         recursive least squares on input-output pairs       [Keipour2019]
     augmented-ekf       effectiveness as states, chi-square on them         [Jazwinski1970], [Simon2006]
@@ -9,9 +9,11 @@
     l1-adaptive         piecewise-constant L1 adaptive control              [Hovakimyan2010]
     lqr                 linear quadratic regulator with integral action     [Anderson1990]
 
-The keys are in REFERENCES.md. What a method leaves open is in its defaults. `beaver-ftc compare --tune`
-chooses those that plugins.yaml lists as `tunable`, of these and of our own methods alike, for each grade of
-flights by itself; tuned.json has what it chose: see benchmark.md.
+The keys are in REFERENCES.md. The parameters that a source leaves open are the defaults of the class.
+plugins.yaml lists the `tunable` ones, of the rivals and of our own methods alike. `beaver-ftc compare --tune`
+chooses their values for each grade of flights, and tuned.json has these values (benchmark.md).
+
+A grade is a kind of flights: exact, with actuators that lag, or with errors of sensors or air.
 """
 
 import json
@@ -30,7 +32,7 @@ FLIGHT_GRADES = (EXACT_GRADE, LAGGING_ACTUATORS_GRADE, SENSOR_OR_AIR_ERRORS_GRAD
 # key in TUNED_FILE of each group of plug-ins
 TUNED_FILE_KEY_BY_PLUGIN_GROUP = {DETECTORS: "detectors", LAWS: "laws"}
 
-TunedValuesByGrade = dict[str, Any]  # grade -> "detectors" or "laws" -> method -> its values
+TunedValuesByGrade = dict[str, Any]  # grade -> "detectors" or "laws" -> method -> parameter -> value
 
 
 @cache
@@ -51,15 +53,14 @@ def flight_grade(has_sensor_or_air_errors: bool, has_ideal_actuators: bool) -> s
 def tuned_values(grades: TunedValuesByGrade, grade: str, group: str, name: str) -> dict[str, float]:
     """The values chosen for a method, of a group of plug-ins, on a grade of flights; none if nothing was
     chosen there."""
-    of_group = grades.get(grade, {}).get(TUNED_FILE_KEY_BY_PLUGIN_GROUP[group], {})
-    values: dict[str, float] = of_group.get(name, {})
+    methods = grades.get(grade, {}).get(TUNED_FILE_KEY_BY_PLUGIN_GROUP[group], {})
+    values: dict[str, float] = methods.get(name, {})
     return values
 
 
 def rival_options(name: str, defaults: Mapping[str, float], context: Context) -> dict[str, float]:
-    """The parameters a rival flies with: its defaults, what the tuning found, what the scenario says.
-
-    The last one counts. Raises BadInput for one it does not have.
+    """The parameters with which a rival flies. A value of the scenario comes before one of the tuning, and
+    this before a default. Raises BadInput for an option that the rival does not have.
     """
     for option in context.options:
         if option not in defaults:

@@ -3,9 +3,14 @@
     z = (p, q, r, theta of the surface that leads roll, pitch, yaw)
     x[k+1] = x[k] + dt (f + G u + sum_s theta_s G_s u_s),     theta[k+1] = theta[k] + a random walk
 
-theta in [-1, 0] is minus the lost share of the effectiveness [Zhang2005, eq. (4)]. The declared bound on the
-uncertainty is taken for a standard deviation, times `noise`: it is no white noise, which is what the
-filters assume. Declared gyro noise is the measurement's; declared turbulence adds states (kalman.py).
+    x = (p, q, r)   rad/s             f    rad/s2        acceleration without surfaces
+    G_s u_s         rad/s2            effect of surface s
+    theta           1, in [-1, 0]     minus the lost share of the effectiveness [Zhang2005, eq. (4)]
+    nu, S           rad/s, (rad/s)2   innovation and its covariance
+
+The filters assume white noise, and the declared bound on the uncertainty describes none. `noise` times this
+bound is taken for the standard deviation. The declared gyro noise is that of the measurement; declared
+turbulence adds states (kalman.py).
 """
 
 from collections.abc import Mapping
@@ -21,28 +26,28 @@ from beaver_ftc.diagnosis.rivals.rival import UNANTICIPATED
 _STEP_RAD_S = 1e-6  # for df/dx: f is quadratic in x, so a central difference is exact to rounding
 _STEPS = _STEP_RAD_S * np.vstack((np.eye(3), -np.eye(3)))
 N_RATES, THETA, N_STATES_WITHOUT_GUSTS = 3, slice(3, 6), 6
-_MAX_SQUARE = 1e6  # of an innovation: a broken sensor may read far off, and the mean must recover
+_MAX_SQUARE = 1e6  # limit of nu' S^-1 nu, so that its mean recovers after wrong readings of a broken sensor
 DEFAULT_OPTIONS = {
     "noise": 3.0,  # standard deviation of the acceleration error over its declared bound
     "drift_per_s": 0.1,  # random walk of theta, 1/sqrt(s)
     "measurement_rad_s": 1e-5,  # standard deviation of the measured rates
-    "misfit": 3.0,  # times its expected value: a mean innovation square above it fits no surface
-    "misfit_s": 0.5,  # over which the innovation square is averaged
+    "misfit": 3.0,  # mean nu' S^-1 nu over its expected value, above which no surface fits
+    "misfit_s": 0.5,  # time over which nu' S^-1 nu is averaged
 }
 
 
 class EffectivenessFilter(KalmanRival):
     """Base of the augmented filters; they differ in `predict` and in `statistic`.
 
-    KalmanRival provides z and P, the mean and covariance of the state; F, the constant part of the
-    transition; `fill_model`, `move` and `add_noise`. RivalDetector provides options, context, dt and
-    `leading`, the index of the surface that leads each axis.
+    KalmanRival provides z (n,) and P (n, n), mean and covariance of the state; F (n, n), the constant part of
+    the transition; `fill_model`, `move` and `add_noise`. RivalDetector provides options, context, dt, s, and
+    `leading` (3,), the index of the surface that leads each axis.
     """
 
     defaults: ClassVar[Mapping[str, float]] = DEFAULT_OPTIONS
 
     def start(self) -> None:
-        """Start healthy, with theta known to a tenth."""
+        """Start healthy, with a standard deviation of 0.1 of theta."""
         self.fill_model(n_theta=3, theta_variance=0.01, walk=self.options["drift_per_s"] ** 2 * self.dt)
         self.fade = exp(-self.dt / self.options["misfit_s"])
         self.mean_square = float(N_RATES)
@@ -74,8 +79,8 @@ class EffectivenessFilter(KalmanRival):
         return wald
 
     def isolate(self, measured: Measured) -> Verdict:
-        """Name the surface whose theta is most significantly off, or none: innovations misfit, or a surface
-        would have gained."""
+        """The verdict on the surface with the largest theta^2 / variance; UNANTICIPATED if the mean
+        innovation is too large for any surface, or if that surface would have gained effectiveness."""
         i = int(np.argmax(self.wald_statistics()))
         theta = self.z[THETA]
         if self.mean_square > N_RATES * self.options["misfit"] or theta[i] > 0.0:
@@ -112,13 +117,15 @@ class AugmentedUkf(EffectivenessFilter):
     name: ClassVar[str] = "augmented-ukf"
     defaults: ClassVar[Mapping[str, float]] = DEFAULT_OPTIONS | {
         "alarm": 20.0,  # level of the CUSUM g
-        "allowance": 3.0,  # of nu' S^-1 nu per frame, over its mean in a healthy flight
+        "allowance": 3.0,  # of nu' S^-1 nu in a frame, as a multiple of its mean in a healthy flight
         "spread": float(N_STATES_WITHOUT_GUSTS),  # n + kappa of the sigma points, without gusts
     }
 
     def predict(self, measured: Measured, before: Measured) -> None:
-        """Move the sigma points through the dynamics; their mean and covariance are z- and P-. f differs
-        between points by its change from the measured state, both of the frame before."""
+        """Move the sigma points through the dynamics; their mean and covariance are z- and P-:
+
+        acceleration of a point = acceleration of the elapsed frame + f(point) - f(x before)
+        """
         points, weights = sigma_points(self.z, self.P, self.options["spread"] + self.n_air)
         f = self.context.model.f(np.concatenate((points[:, :3], before.x[None])), before.y)
         points = self.move(points, self.transition(measured), measured.acceleration + f[:-1] - f[-1])
@@ -127,7 +134,7 @@ class AugmentedUkf(EffectivenessFilter):
         self.P = self.add_noise((off.T * weights) @ off, measured, self.options["noise"])
 
     def statistic(self, square: float) -> float:
-        """g = max(0, g + square - N_RATES allowance) over the alarm level; N_RATES is the mean of a healthy
-        flight."""
+        """g over the alarm level, with g <- max(0, g + square - N_RATES allowance). N_RATES is the mean of
+        nu' S^-1 nu in a healthy flight."""
         self.cusum = max(0.0, self.cusum + square - N_RATES * self.options["allowance"])
         return self.cusum / self.options["alarm"]

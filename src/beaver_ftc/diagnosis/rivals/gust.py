@@ -1,12 +1,17 @@
-"""The gusts that vanes show, from what every plug-in is given: air data, attitude, accelerometers.
+"""The gusts that vanes measure, from signals that every plug-in receives: air data, attitude, accelerometers.
 
     dw = L' v[k-1] + dt (L' f + g) - L' v[k]     change of the air's velocity, m/s, in level axes
     tau q_g' + q_g = w_g' / V,  tau r_g' + r_g = v_g' / V     rotation of the air, rad/s [MIL-F-8785C, 3.7]
     tau = tau_trim V_trim / V     time constants, s, at the measured airspeed V, m/s
 
-v: velocity relative to the air, m/s, by airspeed and vanes; f: accelerometers, m/s2; L: from level to body
-axes; w_g and v_g: velocity of the air downwards and to the right, m/s. The level axes of a frame point where
-the nose did at its beginning. No vane shows the rolling gust p_g.
+    v          m/s     velocity relative to the air, in body axes, by airspeed and vanes
+    f, g       m/s2    accelerometers, in body axes; gravity, in level axes
+    L          (3, 3)  rotation from level to body axes
+    w_g, v_g   m/s     velocity of the air downwards and to the right
+    p_g, q_g, r_g  rad/s   rotation of the air; no vane measures p_g
+
+The level axes of a frame point ahead, to the right and down, with the heading that the nose had at the
+beginning of the frame.
 """
 
 from math import cos, sin
@@ -21,15 +26,18 @@ from beaver_ftc.diagnosis import Measured
 from beaver_ftc.diagnosis.gusts import fill_rotation
 from beaver_ftc.diagnosis.informed_test import with_measured_gust
 
-_SHOWN = slice(1, 3)  # q_g and r_g, of the rotation (p_g, q_g, r_g)
-_AZ_AY = [5, 4]  # of the further instruments: three angles, accelerations (a_x, a_y, a_z), altitude
-_TURNED_SHARE = 0.3  # of noises of airspeed and bank in the flow's angles: attitudes and incidences of 17 deg
-_LEAST_AIRSPEED_MPS = 1.0  # a broken sensor may read 0, and the rotation of the air is over the airspeed
+_MEASURED = slice(1, 3)  # q_g and r_g, of the rotation (p_g, q_g, r_g)
+_AZ_AY = [5, 4]  # places among the further instruments: three angles, accelerations (a_x, a_y, a_z), altitude
+# Share of the noises of airspeed and bank that enters the angles of the flow: the sine of an attitude, or of
+# a flow angle, of 17 deg.
+_TURNED_SHARE = 0.3
+_LEAST_AIRSPEED_MPS = 1.0  # least divisor: a broken sensor may read 0
 _GRAVITY = np.array([0.0, 0.0, GRAVITY_MPS2])
 
 
 class VaneGust:
-    """The effect of the measured gust, frame by frame. context: that of a detector that subtracts it."""
+    """The effect of the measured gust, frame by frame. Its attribute `context` is for a detector that
+    subtracts this effect: it declares only the rest of the turbulence."""
 
     def __init__(self, context: Context) -> None:
         declared = context.declared
@@ -58,9 +66,9 @@ class VaneGust:
         further = np.hypot(declared.further_noise, declared.further_resolution / np.sqrt(12.0))
         phi, theta_psi, az_ay = further[0], further[1:3], further[_AZ_AY]
         angles = np.hypot(air[:2], theta_psi) + _TURNED_SHARE * (air[2] / V + phi) + az_ay * self._dt / V
-        rotation = angles / self._lag_s[_SHOWN]
+        rotation = angles / self._lag_s[_MEASURED]
         of_level_axes = self._effect @ _level_axes(0.0, float(context.trim_y[0])).T  # straight and level
-        return np.hypot(*(of_level_axes[:, _SHOWN] * rotation).T)
+        return np.hypot(*(of_level_axes[:, _MEASURED] * rotation).T)
 
     def subtracted(self, measured: Measured) -> Measured:
         """The measurements, with the effect of the gust in the acceleration of the elapsed frame, from which
@@ -69,8 +77,8 @@ class VaneGust:
             acceleration + V / V_trim B (0, q_g, r_g)
             (q_g, r_g) <- exp(-dt / tau) (q_g, r_g) + (dw_z, dw_y) / (V tau)
 
-        B: gust_effect; dw, m/s: the air's, downwards and to the right of the heading as the frame began; tau
-        s.
+        B 1/s: gust_effect; dw m/s: change of the air's velocity, downwards and to the right of the heading at
+        the beginning of the frame; tau s. The first frame has no effect.
         """
         if not self._is_measured:
             return measured
@@ -84,12 +92,12 @@ class VaneGust:
         self._expected, self._heading = velocity + self._dt * (force + _GRAVITY), psi
         if expected is None:
             return measured
-        # The rotation at the beginning of the frame, in body axes; those of its end serve, to first order.
+        # The rotation at the beginning of the frame, in the body axes of its end: the same to first order.
         acting = self._rotation @ to_level
         velocity[1] = sin(turn) * velocity[0] + cos(turn) * velocity[1]  # to the right of the old heading
         dw = (expected - velocity)[[2, 1]]  # downwards, which pitches the air; to the right, which yaws it
-        tau = self._lag_s[_SHOWN] * self._airspeed / V
-        self._rotation[_SHOWN] = np.exp(-self._dt / tau) * self._rotation[_SHOWN] + dw / (V * tau)
+        tau = self._lag_s[_MEASURED] * self._airspeed / V
+        self._rotation[_MEASURED] = np.exp(-self._dt / tau) * self._rotation[_MEASURED] + dw / (V * tau)
         air = (V / self._airspeed) * (self._effect @ acting)
         return measured._replace(acceleration=measured.acceleration + air)
 

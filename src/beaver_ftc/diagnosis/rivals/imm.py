@@ -1,9 +1,16 @@
 """Interacting multiple models: one Kalman filter a hypothesis, and the probability of each.
 
-Hypotheses: healthy; a quarter, half and nine tenths of the effectiveness lost by the leader of each axis; and
-one that explains anything badly, by noise alone, for faults outside the class. Mixing, filtering, combination
-as in [Blom1988]; actuator faults as modes as in [Zhang1998]. Declared turbulence is a state of each
-(kalman.py).
+The hypotheses, or modes, j = 0 ... M - 1 in this order (M is N_MODES):
+
+    healthy
+    a loss of 25, 50 and 90 % of the surface that leads roll; the same for pitch; the same for yaw
+    unknown: large noise explains any flight, but badly; for faults outside the class
+
+    z (M, n), P (M, n, n)   mean and covariance of the state of each mode (kalman.py)
+    mu (M,)                 probability of each mode
+
+Mixing, filtering and combination are those of [Blom1988], actuator faults as modes those of [Zhang1998].
+Declared turbulence adds states (kalman.py).
 """
 
 from collections.abc import Mapping
@@ -17,13 +24,13 @@ from beaver_ftc.diagnosis.rivals.rival import UNANTICIPATED
 
 LOSS_THETA_LEVELS = (-0.25, -0.5, -0.9)
 N_LEVELS = len(LOSS_THETA_LEVELS)
-# First healthy, then each level of the leader of roll, pitch and yaw, then noise.
+# The order of the modes: healthy; each level of the surfaces that lead roll, pitch and yaw; unknown.
 N_MODES = 1 + 3 * N_LEVELS + 1
 _MIN_MODE_PROBABILITY = 1e-12  # no probability below it: a mode must be able to come back
 
 
 def transition_matrix(stay: float, n: int) -> np.ndarray:
-    """Markov chain (n, n): stay with that probability, else go anywhere alike."""
+    """Markov chain (n, n) of the modes: `stay` on the diagonal, (1 - stay) / (n - 1) elsewhere."""
     chain = np.full((n, n), (1.0 - stay) / (n - 1))
     np.fill_diagonal(chain, stay)
     return chain
@@ -64,13 +71,13 @@ class InteractingMultipleModels(KalmanRival):
         "alarm": 5.0,  # logarithm of the odds of a fault
         "isolate": 0.9,  # probability at which a surface is named
         "noise": 3.0,  # standard deviation of the acceleration error over its declared bound
-        "unknown_noise": 30.0,  # the same of the hypothesis that explains anything badly
+        "unknown_noise": 30.0,  # the same of the unknown mode
         "stay": 0.9999,  # probability that the hypothesis stays true for a frame
         "measurement_rad_s": 1e-5,  # standard deviation of the rate measured by a perfect gyro
     }
 
     def start(self) -> None:
-        """Healthy, almost certainly."""
+        """Start with the healthy mode, whose probability is almost 1."""
         self.fill_model()
         self.chain = transition_matrix(self.options["stay"], N_MODES)
         self.mu = np.full(N_MODES, _MIN_MODE_PROBABILITY)
@@ -94,10 +101,11 @@ class InteractingMultipleModels(KalmanRival):
         return float(np.log((1.0 - self.mu[0]) / self.mu[0]) / self.options["alarm"])
 
     def isolate(self, measured: Measured) -> Verdict:
-        """The surface whose hypotheses together have a probability above `isolate`, with their mean theta.
+        """The verdict by the probabilities, with the level `isolate`:
 
-        If the last hypothesis has it, the fault is unanticipated. If none has it, the candidates are the
-        surfaces above 1 - `isolate`.
+        unknown mode above `isolate`                       unanticipated
+        modes of one surface together above `isolate`      this surface, with their mean theta
+        otherwise                                          candidates: surfaces above 1 - `isolate`
         """
         least, levels = self.options["isolate"], self.mu[1:-1].reshape(3, N_LEVELS)
         if self.mu[-1] > least:

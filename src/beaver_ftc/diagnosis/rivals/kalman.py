@@ -3,9 +3,14 @@
     predict    z- = F z + (dt xdot, 0),  P- = F P F' + Q
     update     S = H P H' + R,  K = P H' S^-1,  z+ = z- + K nu,  P+ = P- - K S K'
 
-[Simon2006, ch. 5], sigma points [Julier2004]. H picks the first states: what is measured are the body rates.
+[Simon2006, ch. 5], sigma points [Julier2004]. H selects the first states, because the body rates are
+measured.
 
-    z = (p, q, r, theta, g)      theta: parameters, a random walk; g: rotation of the air, if declared
+    z = (p, q, r, theta, g)   (n,)   p, q, r: rad/s; theta: parameters, a random walk; g: rotation of the air,
+                                     rad/s, if declared
+    P                         (n, n) covariance of z
+    nu, S                     rad/s  innovation (3,) and its covariance (3, 3), (rad/s)2
+    xdot                      rad/s2 (3,) acceleration of the design model
 
 Turbulence is the rotation of the air as three more states, a first-order process for each axis, as declared
 (design/context.py):
@@ -22,8 +27,9 @@ from beaver_ftc.diagnosis.rivals.rival import RivalDetector
 class KalmanRival(RivalDetector):
     """Base of the rivals by Kalman filters: each has `predict` and `update_statistic`.
 
-    F (n, n) without the dynamics of the aircraft; q (n,): diagonal of Q but for the rates; R (3, 3); z, P:
-    state and covariance of one filter. before: the measurements of the frame before; None in the first.
+    F (n, n): transition without the dynamics of the aircraft. q (n,): diagonal of Q, without that of the
+    rates. R (3, 3): covariance of the measurement, (rad/s)2. z, P: state and covariance of one filter.
+    before: the measurements of the frame before; None in the first frame.
     """
 
     before: Measured | None
@@ -74,9 +80,10 @@ class KalmanRival(RivalDetector):
     def add_noise(self, P: np.ndarray, measured: Measured, noise: float | np.ndarray) -> np.ndarray:
         """Add Q to P (..., n, n) in place, and return P.
 
-        The acceleration that nothing explains has the size of the declared bound times noise (...). That
-        bound is eta_bar as long as it is the published one. With more declared, eta_bar is the sum of all
-        worst cases, instruments and air included, which have states or a variance of their own here.
+        Q = diag(q), and for the rates (dt noise size)^2; noise (...): one for each filter. size (3,) rad/s2:
+        eta_bar while only the published bound is declared. With further declared errors, eta_bar is the sum
+        of all worst cases. Instruments and air have a variance or states of their own here, so that size is
+        the constant bound with the declared model error.
         """
         size = self.own_bound if self.context.declared.errors else measured.eta_bar
         diagonal = np.einsum("...ii->...i", P)  # a view

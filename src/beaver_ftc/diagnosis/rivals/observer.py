@@ -3,16 +3,18 @@
     eps[k+1] = a eps[k] + nu,   a = exp(-pole dt)        alarm when |eps_i| > alarm constant_i / pole
     nu = x[k+1] - x[k] - dt (f + G u),   rad/s
 
-The residual is that of the published detection estimator; only the threshold does not move with the state.
-From the alarm on, a residual started again is fitted by the filtered effect of each surface, by least squares
-over a fading window; the best fit names the fault, and a window after the alarm the name stands.
+The residual is that of the published detection estimator, but the threshold does not follow the state. At the
+alarm a second residual starts from zero. The filtered effect of each surface is fitted to it by least squares
+over a fading window. The best fit names the fault; one window after the alarm the name is final.
 
-What is declared of gyros, air and model has a known deviation behind that filter; the threshold is `alarm`
-times all of it together:
+The declared errors of gyros, air and model have a known variance behind the filter, (rad/s)^2. The threshold
+is `alarm` times the root of their sum:
 
-    gyro  n[k+1] - n[k], white      -> sigma^2 2 / (1 + a)
-    air   first order, r = exp(-dt / tau) -> dt^2 sigma^2 (1 + a r) / ((1 - a^2) (1 - a r))
-    model constant or slow          -> dt^2 (bound^2 + sigma^2) / (1 - a)^2
+    gyro     white noise n, as n[k+1] - n[k]         2 sigma^2 / (1 + a)
+    air      first order, r = exp(-dt / tau)         dt^2 sigma^2 (1 + a r) / ((1 - a^2) (1 - a r))
+    model    constant or slow                        dt^2 (bound^2 + sigma^2) / (1 - a)^2
+
+sigma: rad/s of a gyro, rad/s2 of air and model; bound rad/s2.
 """
 
 from collections.abc import Mapping
@@ -46,16 +48,16 @@ class ConstantThresholdObserver(RivalDetector):
 
         J_s = min over theta in [-1, 0] of sum |eps - theta Omega_s|^2, in units of the threshold
 
-    filtered (3, 5): eps since the start; eps and Omega (a column a surface) since the alarm, rad/s. sums (4,
-    4): fading sums of the products of the last four columns, in units of the threshold; weight: of the
-    frames in them.
+    filtered (3, 5) rad/s    eps since the start; eps and Omega_s since the alarm, a column for each surface
+    sums (4, 4)              fading sums of the products of the last four columns, in units of the threshold
+    weight                   fading number of frames in these sums
     """
 
     name: ClassVar[str] = "observer-constant"
     defaults: ClassVar[Mapping[str, float]] = {"alarm": 2.0, "pole_per_s": 10.0, "window_s": 0.5}
 
     def start(self) -> None:
-        """No residual."""
+        """Start with residuals of zero."""
         pole, context = self.options["pole_per_s"], self.context
         self.a = exp(-pole * self.dt)
         level = np.maximum(context.constant_rad_s2, _LEAST_BOUND_RAD_S2) / pole
@@ -81,8 +83,10 @@ class ConstantThresholdObserver(RivalDetector):
         self.filtered[:, 1:] = 0.0
 
     def isolate(self, measured: Measured) -> Verdict:
-        """The surface that fits, until a window after the alarm; none fits if what it leaves is still over
-        the threshold in the mean of axes and frames.
+        """The surface with the smallest misfit, until a window after the alarm; afterwards the last verdict.
+        UNANTICIPATED if the remaining residual exceeds the threshold in the mean of axes and frames:
+
+            misfit_s > N_AXES weight
 
         theta_s = N_s / M_s within [-1, 0],    misfit_s = sum eps^2 - 2 theta_s N_s + theta_s^2 M_s
 

@@ -1,4 +1,4 @@
-"""What the rival detectors share: options, the gust that vanes show, the alarm, the words of a verdict."""
+"""What the rival detectors share: options, the gust that vanes measure, the alarm, the words of a verdict."""
 
 from collections.abc import Mapping
 from typing import ClassVar
@@ -14,14 +14,18 @@ UNANTICIPATED = Verdict(True, None, "unanticipated", "unanticipated")
 
 
 class RivalDetector:
-    """Base of the rival detectors; each has `start`, `advance` and `isolate`."""
+    """Base of the rival detectors; each has `start`, `advance` and `isolate`.
+
+    After `reset`, options has the parameters, context and dt (s) are those of the flight, leading (3,) has
+    the surfaces that lead roll, pitch and yaw, and alarm_s, alarm_axis describe the alarm (inf: none yet).
+    """
 
     name: ClassVar[str] = ""
     defaults: ClassVar[Mapping[str, float]] = {}
 
     def reset(self, context: Context) -> None:
-        """Prepare for a flight. Where vanes show the gust, `step` subtracts it: the detector then has the
-        context that declares only the rest of the turbulence."""
+        """Prepare for a flight. Where vanes measure the gust, `step` subtracts its effect. The context of the
+        detector then declares only the rest of the turbulence."""
         self.options, self.vane_gust = rival_options(self.name, self.defaults, context), VaneGust(context)
         self.context, self.dt = self.vane_gust.context, context.dt_s
         self.leading = list(context.leading)

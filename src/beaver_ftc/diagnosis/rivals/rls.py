@@ -1,9 +1,9 @@
 """Recursive least-squares fault monitor: no model of the aircraft, only what went in and what came out.
 
-For each pair (surface, rate) a linear input-output model is learnt in flight; the error of its one-step
-prediction is compared with the errors before, and the alarm is a score z = (error - mean) / deviation
-beyond a limit [Keipour2019]. The pair that raises the alarm is what is isolated. Departures: two past
-samples of input and output instead of a longer window; mean and deviation fade exponentially.
+For each pair (surface, rate) a linear input-output model is learnt in flight. The error of its one-step
+prediction is compared with the errors before: z = (error - mean) / deviation. If |z| exceeds a limit, the
+alarm is raised, and the surface of the pair is isolated [Keipour2019]. Departures: two past samples of input
+and output instead of a longer window; mean and deviation fade exponentially.
 
 The model y = w' phi is learnt by recursive least squares with exponential forgetting [Ljung1999, sec. 11.2]:
 
@@ -76,8 +76,8 @@ class RlsMonitor(RivalDetector):
     name: ClassVar[str] = "rls-monitor"
     defaults: ClassVar[Mapping[str, float]] = {
         "alarm": 8.0,  # |z|
-        "forgetting_s": 5.0,
-        "score_s": 2.0,
+        "forgetting_s": 5.0,  # time constant with which the models forget
+        "score_s": 2.0,  # time constant of mean and deviation
         "floor_rad_s": 1e-5,  # smallest deviation: a perfect prediction is no reason for an alarm
         "warm_up_s": 4.0,  # before it, the models have seen too little
     }
@@ -97,6 +97,6 @@ class RlsMonitor(RivalDetector):
         return np.array(scores) / self.options["alarm"]
 
     def isolate(self, measured: Measured) -> Verdict:
-        """The first pair beyond the limit is the fault."""
+        """The verdict on the surface of the pair that raised the alarm."""
         surface = self.context.leaders[self.alarm_axis]
         return Verdict(True, "pqr"[self.alarm_axis], surface, candidates=(surface,))

@@ -1,10 +1,16 @@
 """The design model: f, G, their sensitivities, and what the designer knows of air and actuators.
 
 The air is in this file: the standard atmosphere up to 20 km [ISA], and turbulence by Dryden's spectra, its
-speed [MIL-F-8785C, 3.7] and its rotation [Yeager1998]. The vertical gust has standard deviation sigma_w and
-scale L, the lateral gust is its like, both functions of height. Above 2000 ft they are constant; below 1000
-ft sigma_w is a tenth of the wind at 20 ft and L is the height; between the two heights both go from the one
-to the other, and what follows from them is below the values above 2000 ft.
+speed [MIL-F-8785C, 3.7] and its rotation [Yeager1998]. The vertical gust has the standard deviation sigma_w,
+m/s, and the scale L, m; the lateral gust is similar. Both are functions of the height:
+
+    above 2000 ft            constant
+    below 1000 ft            sigma_w is a tenth of the wind at 20 ft, and L is the height
+    between these heights    both change from the one to the other; all quantities derived from them are below
+                             those above 2000 ft
+
+A gust is, over times that are short compared with its correlation time, a *random walk*. Its *intensity* is
+the variance that it gains in a second.
 """
 
 from dataclasses import dataclass
@@ -30,12 +36,18 @@ else:
     __getattr__, __dir__ = lazily(__name__)
 
 
+# Standard atmosphere [ISA]: temperature and pressure at sea level, lapse rate, exponent g / (R lapse) of the
+# pressure, height of the tropopause; gas constant of air, J/(kg K).
 T0_K, LAPSE_K_M, P0_HPA, SCALE, STRATOSPHERE_M = 288.15, 0.0065, 1013.25, 5.2558797, 11000.0
 R_AIR, PA_PER_HPA, KELVIN_AT_0_C = 287.05287, 100.0, 273.15
 
 
 def standard_air(altitude_m: float) -> tuple[float, float]:
-    """Pressure, hPa, and temperature, deg C."""
+    """Pressure, hPa, and temperature, deg C, of the standard atmosphere at an altitude h, m:
+
+    T = T0 - lapse h,    p = P0 (T / T0)^SCALE              up to the tropopause
+    T constant,          p falls with exp(-g h / (R T))     above it
+    """
     low_m = min(altitude_m, STRATOSPHERE_M)
     kelvin = T0_K - LAPSE_K_M * low_m
     pressure = P0_HPA * (kelvin / T0_K) ** SCALE
@@ -43,7 +55,7 @@ def standard_air(altitude_m: float) -> tuple[float, float]:
 
 
 def standard_density(altitude_m: float) -> float:
-    """Density of the air, kg/m3."""
+    """Density of the standard atmosphere at an altitude, kg/m3: p / (R T)."""
     pressure_hpa, celsius = standard_air(altitude_m)
     return PA_PER_HPA * pressure_hpa / (R_AIR * (celsius + KELVIN_AT_0_C))
 
@@ -65,13 +77,14 @@ SEVERITIES: tuple[Severity, ...] = ("none", "light", "moderate", "severe")
 GUST_FT_S = {"none": 0.0, "light": 7.4, "moderate": 10.6, "severe": 23.6}
 SCALE_FT = 1750.0
 SCALE_M = M_PER_FT * SCALE_FT
-# Below 1000 ft: wind at 20 ft, of 15, 30 and 45 kt, and a tenth of it, the gusts, ft/s [MIL-F-8785C, 3.7.3].
+# Below 1000 ft: the wind at 20 ft (15, 30 and 45 kt), and the standard deviation of the vertical gust, a
+# tenth of it; ft/s [MIL-F-8785C, 3.7.3].
 WIND_AT_20_FT = {"light": 25.3, "moderate": 50.6, "severe": 76.0}
 LOW_GUST_FT_S = {"none": 0.0, "light": 2.53, "moderate": 5.06, "severe": 7.6}
 EXCEEDENCE = {"light": 3, "moderate": 4, "severe": 6}  # JSBSim's number of the curve in fig. 7
 LEAST_HEIGHT_M = 3.048  # 10 ft: below this height turbulence is as at this height
-# Of the rotating gusts the rolling one is the strongest: sigma_p = ROLLING sigma_w / sqrt(L b), and it
-# returns within sqrt(L b) / (ROLLING_LAG V) [Yeager1998, eq. 8].
+# The rolling gust is the strongest rotation of the air: sigma_p = ROLLING sigma_w / sqrt(L b), with the time
+# constant sqrt(L b) / (ROLLING_LAG V), for a span b, m, and an airspeed V, m/s [Yeager1998, eq. 8].
 ROLLING, ROLLING_LAG = 1.9, 2.6
 
 
@@ -102,7 +115,7 @@ class Dryden:
         return M_PER_FT * LOW_GUST_FT_S[self.severity]
 
     def rotation_limit_rad_s(self, span_m: float) -> float:
-        """Standard deviation of the air's rotation about any axis: that of the rolling gust."""
+        """Largest standard deviation of the air's rotation about an axis, that of the rolling gust, rad/s."""
         span_ft = span_m / M_PER_FT
         return ROLLING * GUST_FT_S[self.severity] / sqrt(SCALE_FT * span_ft)
 
@@ -111,11 +124,13 @@ class Dryden:
         return ROLLING * self.low_sigma_mps / sqrt(span_m)
 
     def rotation(self, airspeed_mps: float, span_m: float) -> tuple[np.ndarray, np.ndarray]:
-        """Standard deviation (3,) rad/s and correlation time (3,) s of the air's rotation [Yeager1998].
+        """Standard deviation (3,) rad/s and correlation time tau (3,) s of the air's rotation [Yeager1998].
 
         Rolling: a first-order process of its own (eq. 8 to 10). Pitching and yawing: the slope of the
-        vertical and the lateral gusts along the flight path, s / V / (1 + tau s) of each; through Dryden's
-        spectrum the variance is sigma^2 / 2 L^2 (3 / (k (1 + k)) - 1 / (1 + k)^2), k = tau V / L.
+        vertical and the lateral gusts along the flight path, with the transfer function (s / V) / (1 + tau
+        s). Through Dryden's spectrum their variance is
+
+            sigma^2 / (2 L^2) (3 / (k (1 + k)) - 1 / (1 + k)^2),    k = tau V / L
         """
         sigma, L, length = self.sigma_mps, SCALE_M, rotation_lengths(span_m)
         k = length / L
@@ -124,29 +139,24 @@ class Dryden:
         return rotation, length / airspeed_mps
 
     def rotation_walk(self, span_m: float) -> np.ndarray:
-        """Intensity of the random walk that each rotating gust is over times short beside its own, over V.
-
-        (3,) rad2/s3 per m/s, for roll, pitch and yaw. The rolling gust is a first-order process of deviation
-        sigma and lag tau: 2 sigma^2 / tau [Yeager1998, eq. 8]. The others are lagged slopes of a velocity of
-        intensity 3 sigma_w^2 V / L [MIL-F-8785C, 3.7], over (V tau)^2.
-        """
+        """Intensity of the random walk of the rolling, pitching and yawing gust, over the airspeed V; (3,)
+        rad2/s3 per m/s (`_rotation_walk`)."""
         return _rotation_walk(self.sigma_mps, SCALE_M, span_m)
 
     def rotation_walk_at_1_m(self, span_m: float) -> np.ndarray:
-        """The same by the formulas below 1000 ft, where the scale is the height, h in m: over h^1.5 the
-        rolling one, over h the pitching one, and a bound on the yawing one.
-
-        The lateral gust has sigma_v^2 / L_v = sigma_w^2 / h (0.177 + 0.000823 h / ft)^0.4, which is less.
+        """The same by the formulas below 1000 ft, at a height h of 1 m. At another height, the rolling one is
+        divided by h^1.5, and the pitching and the yawing one by h. The yawing one is a bound: the lateral
+        gust has sigma_v^2 / L_v = sigma_w^2 / h (0.177 + 0.000823 h / ft)^0.4, which is less.
         """
         return _rotation_walk(self.low_sigma_mps, 1.0, span_m)
 
     def velocity_walk(self, airspeed_mps: float, faster: float) -> float:
-        """Intensity, m2/s3, of the random walk that a vertical or lateral gust is over short times, for an
-        aircraft so many times faster than this airspeed: 3 sigma_w^2 V / L [MIL-F-8785C, 3.7.1]."""
+        """Intensity, m2/s3, of the random walk of a vertical or lateral gust: 3 sigma_w^2 V / L
+        [MIL-F-8785C, 3.7.1]; V = faster airspeed_mps, m/s."""
         return 3.0 * self.sigma_mps**2 * faster * airspeed_mps / SCALE_M
 
     def angle_walk(self, airspeed_mps: float) -> float:
-        """Intensity, rad2/s, of the random walk of the flow's angle: that of the gust's speed over V^2."""
+        """Intensity, rad2/s, of the random walk of the angle of the flow: 3 sigma_w^2 / (L V)."""
         return 3.0 * self.sigma_mps**2 / (SCALE_M * airspeed_mps)
 
     @property
@@ -157,11 +167,18 @@ class Dryden:
 
 
 def rotation_lengths(span_m: float) -> np.ndarray:
-    """Distance flown within which the rolling, pitching and yawing gust returns, (3,) m [Yeager1998]."""
+    """Correlation length tau V (3,) m of the rolling, pitching and yawing gust [Yeager1998]."""
     return np.array([sqrt(SCALE_M * span_m) / ROLLING_LAG, 4.0 * span_m / pi, 3.0 * span_m / pi])
 
 
 def _rotation_walk(sigma_w: float, L: float, b: float) -> np.ndarray:
+    """Intensity of the random walk of each rotating gust, over the airspeed V: (3,) rad2/s3 per m/s.
+
+        rolling     2 sigma_p^2 / tau: a first-order process [Yeager1998, eq. 8]
+        others      3 sigma_w^2 V / L / (V tau)^2: lagged slopes of the velocity of a gust [MIL-F-8785C, 3.7]
+
+    sigma_w m/s; L m: scale; b m: span; V tau: `rotation_lengths`.
+    """
     rolling = 2.0 * ROLLING**2 * ROLLING_LAG * sigma_w**2 / (L * b) ** 1.5
     velocity = 3.0 * sigma_w**2 / L
     return np.array([rolling, velocity * (pi / (4 * b)) ** 2, velocity * (pi / (3 * b)) ** 2])

@@ -8,13 +8,20 @@ DPT_0, KW_TO_DPT = 0.08696, 191.18  # dpt = DPT_0 + KW_TO_DPT P / (qdyn V)
 
 
 def engine_power_kw(engine_rpm: float, manifold_pressure_inhg: float, density_kg_m3: float) -> float:
-    """Shaft power from the engine's chart fit: kW from rpm, inHg and kg/m3."""
+    """Shaft power, kW, by a fit to the engine's chart, with the manifold pressure p, inHg, and rho0 at sea
+    level:
+
+    0.7355 (-326.5 + 0.00412 (p + 7.4) (rpm + 2010) + (408 - 0.0965 rpm) (1 - rho / rho0))        [FDC]
+    """
     thin_air = (408.0 - 0.0965 * engine_rpm) * (1.0 - density_kg_m3 / SEA_LEVEL_DENSITY_KG_M3)
     return 0.7355 * (-326.5 + 0.00412 * (manifold_pressure_inhg + 7.4) * (engine_rpm + 2010.0) + thin_air)
 
 
 def slipstream(power_kw: float, density_kg_m3: float, airspeed_mps: float) -> float:
-    """dpt, the dimensionless total pressure rise across the propeller: power in kW, not W."""
+    """dpt, the dimensionless rise of total pressure across the propeller:
+
+    DPT_0 + KW_TO_DPT P / (rho V^3 / 2),    P in kW, not W
+    """
     return DPT_0 + KW_TO_DPT * 2.0 * power_kw / (density_kg_m3 * airspeed_mps**3)
 
 

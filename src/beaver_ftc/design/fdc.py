@@ -1,7 +1,7 @@
 """The Beaver on a flat Earth: the twelve nonlinear state equations of the FDC toolbox, [FDC].
 
-An independent road to what JSBSim flies, for linear analysis. Everything is analytic in its arguments, so
-complex steps give its Jacobian to rounding.
+They are independent of JSBSim, and serve linear analysis. All functions are analytic in their arguments, so
+complex steps give the Jacobian to rounding.
 
 State (12,), in the log's order: airspeed m/s, alpha, beta rad, p, q, r rad/s, phi, theta, psi rad, north,
 east, altitude m. Surfaces (4,) rad: aileron, elevator, rudder, flap.
@@ -23,16 +23,16 @@ COEFFICIENTS = (*FORCES, *MOMENTS)
 STATES = ("airspeed", "alpha", "beta", "p", "q", "r", "phi", "theta", "psi", "north", "east", "altitude")
 SURFACES = _AIRCRAFT.surfaces
 
-# Atmosphere as FDC has it: the standard troposphere over geometric altitude, with the gravity of that
-# altitude in the pressure's exponent. Next to the standard's geopotential altitude it changes density by
-# 0.02 % at 3 km.
+# Atmosphere of FDC: the standard troposphere over geometric altitude, with the gravity of that altitude in
+# the exponent of the pressure. At 3 km its density differs by 0.02 % from that of the standard, which is over
+# geopotential altitude.
 _SEA_LEVEL_TEMPERATURE_K = 288.15
 _SEA_LEVEL_PRESSURE_PA = 101325.0
 _LAPSE_K_PER_M = 0.0065
 _GAS_J_PER_KG_K = 287.053
-# Gravity as FDC has it: the standard value, falling with the square of the distance.
+# Gravity of FDC: the standard value at sea level, over the square of the distance from the Earth's centre.
 _EARTH_RADIUS_M = 6371020.0
-_STEP = 1e-30  # complex
+_STEP = 1e-30  # of a complex step
 
 
 def value(name: str) -> float:
@@ -64,17 +64,18 @@ def gravity(altitude_m):
 def aerodynamic_coefficients(
     state: np.ndarray, surfaces: np.ndarray, engine: Engine, ratio: Mapping[str, float] | None = None
 ) -> dict:
-    """CX, CY (without the betadot term), CZ, Cl, Cm, Cn and qdyn Pa; ratio multiplies single terms."""
+    """CX, CY (without the betadot term), CZ, Cl, Cm, Cn and qdyn, Pa, by name; state (12,), surfaces (4,)
+    rad; `ratio` multiplies single terms."""
     V, alpha, beta, p, q, r = state[:6]
     density = air_density(state[11])
     power = engine_power_kw(engine.speed_rpm, engine.manifold_pressure_inhg, density)
     b, c = GEOMETRY.span_m, GEOMETRY.chord_m
-    of = {
+    signals = {
         "alpha": alpha, "beta": beta, "ph": p * b / (2 * V), "qh": q * c / V, "rh": r * b / (2 * V),
         "dpt": slipstream(power, density, V), "betadoth": 0.0,
         **dict(zip(SURFACES, surfaces, strict=True)),
     }  # fmt: skip
-    summed = {name: _AIRCRAFT.coefficient(name, of, ratio) for name in COEFFICIENTS}
+    summed = {name: _AIRCRAFT.coefficient(name, signals, ratio) for name in COEFFICIENTS}
     return summed | {"qdyn": 0.5 * density * V * V}
 
 
@@ -89,10 +90,17 @@ def derivatives(
 
 
 def _flow_rates(state: np.ndarray, coef: Mapping, betadot_ratio: float) -> np.ndarray:
-    """Vdot, alphadot, betadot; the force of betadot acts across the flight path: it changes betadot alone.
+    """Vdot m/s2, alphadot, betadot rad/s:
 
-    alphadot = (Z cos(alpha) - X sin(alpha)) / (m V cos(beta)) + q - (p cos(alpha) + r sin(alpha)) tan(beta)
-    betadot = betadot_0 + side betadot,  side = CY_betadot qdyn S b / (2 V) / (m V)
+        Vdot = F . t / m
+        alphadot = (Z cos(alpha) - X sin(alpha)) / (m V cos(beta))
+                   + q - (p cos(alpha) + r sin(alpha)) tan(beta)
+        betadot = betadot_0 / (1 - side),    side = CY_betadot qdyn S b / (2 V) / (m V)
+        betadot_0 = (Y cos(beta) - (X cos(alpha) + Z sin(alpha)) sin(beta)) / (m V)
+                    + p sin(alpha) - r cos(alpha)
+
+    F = (X, Y, Z) N: aerodynamic force and weight, body axes; t (3,): direction of flight. The force by
+    betadot acts across the flight path, so it changes betadot alone.
     """
     V, alpha, beta, p, q, r = state[:6]
     area, down = coef["qdyn"] * GEOMETRY.wing_area_m2, _to_body(*state[6:9])[:, 2]
@@ -113,7 +121,7 @@ _INERTIA_KG_M2 = np.array(
 
 
 def _body_accelerations(state: np.ndarray, coef: Mapping) -> np.ndarray:
-    """pdot, qdot, rdot: I x' = M - x x I x."""
+    """pdot, qdot, rdot, rad/s2: I x' = M - cross(x, I x), with x = (p, q, r), M (3,) N m."""
     x = state[3:6]
     lengths = np.array([GEOMETRY.span_m, GEOMETRY.chord_m, GEOMETRY.span_m])
     arms = coef["qdyn"] * GEOMETRY.wing_area_m2 * lengths
@@ -136,14 +144,18 @@ def _to_body(phi: complex, theta: complex, psi: complex) -> np.ndarray:
 
 
 def _euler_rates(state: np.ndarray) -> np.ndarray:
-    """phidot, thetadot, psidot."""
+    """phidot, thetadot, psidot, rad/s:
+
+    psidot = (q sin(phi) + r cos(phi)) / cos(theta)
+    phidot = p + psidot sin(theta),    thetadot = q cos(phi) - r sin(phi)
+    """
     p, q, r, phi, theta = state[3:8]
     turn = (q * np.sin(phi) + r * np.cos(phi)) / np.cos(theta)
     return np.array([p + turn * np.sin(theta), q * np.cos(phi) - r * np.sin(phi), turn])
 
 
 def _track(state: np.ndarray) -> np.ndarray:
-    """Velocity over the ground: north, east, up, in still air."""
+    """Velocity over the ground (3,) m/s in still air: north, east, up."""
     north, east, down = state[0] * _flow(*state[1:3]) @ _to_body(*state[6:9])
     return np.array([north, east, -down])
 

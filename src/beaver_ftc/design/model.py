@@ -75,7 +75,7 @@ def inertia_coefficients(mass: MassProperties) -> InertiaCoefficients:
 
 
 def inertia_of(design: np.void) -> InertiaCoefficients:
-    """Those of a design model's record (dtype `design_dtype`)."""
+    """The inertia coefficients of a design model's record (dtype `design_dtype`)."""
     return InertiaCoefficients(*(float(design[name]) for name in InertiaCoefficients._fields))
 
 
@@ -97,8 +97,8 @@ def design_record(
 ) -> np.ndarray:
     """The design model as a record array of shape (1,), dtype `design_dtype`.
 
-    `scale` multiplies single terms, `mass` is what the designer takes the inertia for: deliberate errors of
-    the designer.
+    Deliberate errors of the designer: `scale` has factors on single terms by name; the inertia is that of
+    `mass`.
     """
     aircraft = aircraft or load()
     design = np.zeros(1, design_dtype(aircraft.n))
@@ -126,14 +126,14 @@ def response(design, x, y, f, G):
 
 @kernel
 def responses(design, x, y, f, G):
-    """The same at each of x (n, 3) and y (n, 4 + declared), into f (n, 3) and G (n, 3, surfaces)."""
+    """`response` at n states x (n, 3), y (n, 4 + declared), into f (n, 3) and G (n, 3, surfaces)."""
     for i in range(x.shape[0]):
         response(design, x[i], y[i], f[i], G[i])
 
 
 @kernel
 def linear_response(design, x, y, f, G):
-    """Fill f and G with the linear model about (x0, y0)."""
+    """Fill f (3,) and G (3, surfaces): f = f0 + f_x (x - x0) + f_y (y - y0),  G = G0."""
     for i in range(3):
         f[i] = design.f0[i]
         for j in range(3):
@@ -153,9 +153,8 @@ def nonlinear_response(design, x, y, f, G):
 
 @kernel
 def nonlinear_response_from_table(design, x, y, f, G):
-    """Fill f and G as `nonlinear_response` does, from the monomials that are already in the table.
-
-    Those may be of the rates against the air; x (3,) rad/s: rates against the ground.
+    """Fill f and G as `nonlinear_response` does, from the monomials that are already in the table. These may
+    be those of the rates against the air; x (3,) rad/s are the rates against the ground.
     """
     table = design.moments
     for i in range(3):
@@ -184,7 +183,7 @@ def accelerate(design, y, C):
 
 @kernel
 def add_coupling(design, x, f):
-    """Add to f (3,) rad/s2 what the inertia makes of the rates x (3,) rad/s."""
+    """Add to f (3,) rad/s2 the terms of the rate products, of x = (p, q, r) rad/s."""
     p, q, r = x[0], x[1], x[2]
     f[0] += design.Ppq * p * q + design.Pqr * q * r
     f[1] += design.Qpp * p * p + design.Qpr * p * r + design.Qrr * r * r
@@ -193,8 +192,9 @@ def add_coupling(design, x, f):
 
 @kernel
 def rate_damping(design, x, y, u, scratch, out):
-    """Fill out (3, 3) 1/s: what the aerodynamic moments' accelerations change by per rate of the aircraft
-    against the air. x (3,) rad/s, y (4 + declared,), u (surfaces,) rad; scratch (MAX_MONOMIALS,).
+    """Fill out (3, 3) 1/s: derivatives of the accelerations by the aerodynamic moments (rows) with the rates
+    of the aircraft against the air (columns). x (3,) rad/s, y (4 + declared,), u (surfaces,) rad; scratch
+    (MAX_MONOMIALS,).
 
     The table has the rates as ph = p b / 2V, qh = q c / V, rh = r b / 2V; per_rate is their scale, s.
     """
@@ -226,10 +226,8 @@ def acceleration(f, G, u, out):
 
 
 def design_of(declared: Any) -> np.ndarray:
-    """The design record (1,) of a `Declared`: the aircraft's file with what the designer leaves out or gets
-    wrong.
-
-    One that is tied to the trim wants `anchor` as well.
+    """The design record (1,) of a `Declared`: the aircraft's file with the errors and simplifications of the
+    designer. A linearised or frozen model also needs `anchor`.
     """
     model = declared.design_model
     design = design_record(declared.aircraft, scale=declared.scale, mass=declared.mass)
@@ -238,7 +236,7 @@ def design_of(declared: Any) -> np.ndarray:
 
 
 def anchor(design: np.void, x: np.ndarray, y: np.ndarray, u: np.ndarray) -> None:
-    """Fix the point a model is linearised about or frozen at: x (3,) rad/s, y, u rad in trim."""
+    """Fix the point at which a model is linearised or frozen: x (3,) rad/s, y, u rad in trim."""
     if not (design["linearised"] or design["frozen_alpha"]):
         return
     f, G, f_x, f_y = jacobian(design, x, y, u)
@@ -282,7 +280,7 @@ def _coefficients(table: Any, signal: np.ndarray, n: int) -> tuple[np.ndarray, n
 
 
 def _fields(fields: np.void) -> SimpleNamespace:
-    """A record's fields as attributes; NumPy's own records take ten times as long to find one."""
+    """The fields of a record as attributes. Attributes of NumPy's own records are ten times as slow."""
     return SimpleNamespace(**{name: fields[name] for name in fields.dtype.names or ()})
 
 
@@ -295,15 +293,16 @@ def coefficient_slopes(design: np.void, x: np.ndarray, y: np.ndarray, u: np.ndar
 
 
 def inertial(inertia: InertiaCoefficients, x: np.ndarray) -> np.ndarray:
-    """The angular acceleration (n, 3) rad/s2 of turning with no moment, from the rate products [FDC]."""
+    """The angular acceleration (n, 3) rad/s2 without moments at rates x (n, 3) rad/s: the terms of the rate
+    products [FDC]."""
     f = np.zeros((3, len(x)))
     plain(add_coupling)(inertia, x.T, f)
     return f.T
 
 
 def responses_at(design: np.void, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """f (n, 3) rad/s2 and G (n, 3, surfaces) rad/s2 per rad at many states: what `response` gives at each of
-    x (n, 3) rad/s and y (n, 4 + declared)."""
+    """f (n, 3) rad/s2 and G (n, 3, surfaces) rad/s2 per rad of `response` at n states: x (n, 3) rad/s, y (n,
+    4 + declared)."""
     f, G = np.empty(x.shape), np.zeros((len(x), *design["G0"].shape))
     responses(design, np.ascontiguousarray(x), np.ascontiguousarray(y), f, G)
     return f, G

@@ -25,7 +25,7 @@ _DECLARED = len(FLOW_SIGNALS)  # where declared signals begin among the signals
 
 TABLE = record(
     span=float, chord=float, n_declared=int,
-    # monomial k is monomial parent[k] times signal factor[k]; the first is 1
+    # monomial k is monomial parent[k] times signal factor[k]; monomial 0 is 1
     n_monomials=int, parent=("u8", MAX_MONOMIALS), factor=("u8", MAX_MONOMIALS),
     # of each coefficient the terms without a surface, and those with one
     n_terms=int, free_from=(int, 3), free_to=(int, 3), surface_to=(int, 3), value=MAX_TERMS,
@@ -44,33 +44,34 @@ def fill_table(
 ) -> None:
     """Write terms, sorted as `Aircraft.moments` are, into a record; `scale` multiplies single values."""
     scale = scale or {}
-    of_terms = [_monomial(term, aircraft) for term in terms]
-    chain = _chain(of_terms)
+    needed = [_monomial(term, aircraft) for term in terms]
+    chain = _chain(needed)
     fill(
         table, span=aircraft.geometry.span_m, chord=aircraft.geometry.chord_m, n_terms=len(terms),
         n_declared=len(aircraft.signals), n_monomials=len(chain),
     )  # fmt: skip
     for k, monomial in enumerate(chain[1:], start=1):
         table["parent"][k], table["factor"][k] = chain.index(monomial[:-1]), monomial[-1]
-    for k, (term, monomial) in enumerate(zip(terms, of_terms, strict=True)):
+    for k, (term, monomial) in enumerate(zip(terms, needed, strict=True)):
         table["value"][k] = term.value * scale.get(term.name, 1.0)
         table["monomial"][k] = chain.index(monomial)
         table["surface"][k] = aircraft.surfaces.index(term.surface) if term.surface else -1
     first = 0
     for i, coefficient in enumerate(coefficients):
-        of_it = [term for term in terms if term.coefficient == coefficient]
+        own_terms = [term for term in terms if term.coefficient == coefficient]
         table["free_from"][i] = first
-        table["free_to"][i] = first + sum(term.surface is None for term in of_it)
-        first = table["surface_to"][i] = first + len(of_it)
+        table["free_to"][i] = first + sum(term.surface is None for term in own_terms)
+        first = table["surface_to"][i] = first + len(own_terms)
 
 
 def _monomial(term: Term, aircraft: Aircraft) -> tuple[int, ...]:
-    """The signals a term multiplies, one entry a power, in a fixed order."""
+    """The monomial of a term: the numbers of its signals, each once for each power, in ascending order."""
     return tuple(sorted(aircraft.signal_names.index(name) for name, power in term.of for _ in range(power)))
 
 
 def _chain(wanted: Iterable[tuple[int, ...]]) -> list[tuple[int, ...]]:
-    """Monomials, each one factor longer than an earlier one, that contain all wanted ones."""
+    """A chain of monomials that contains all wanted ones: the first is 1, and each other one is an earlier
+    one with one more factor."""
     chain: list[tuple[int, ...]] = [()]
     for monomial in wanted:
         for length in range(1, len(monomial) + 1):
@@ -83,7 +84,8 @@ def _chain(wanted: Iterable[tuple[int, ...]]) -> list[tuple[int, ...]]:
 
 @kernel
 def signals(table, x, y, out):
-    """Fill out (N_SIGNALS,): alpha, beta rad, ph, qh, rh, declared ones. x (3,) rad/s; y (4 + declared,)."""
+    """Fill out (N_SIGNALS,): alpha, beta rad; ph = p b / 2V, qh = q c / V, rh = r b / 2V; the declared ones.
+    x (3,) rad/s: p, q, r; y (4 + declared,); b, c m: span and chord."""
     V = y[AIRSPEED]
     out[ALPHA], out[BETA] = y[ALPHA], y[BETA]
     out[PH] = x[0] * table.span / (2 * V)

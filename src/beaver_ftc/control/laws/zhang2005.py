@@ -2,16 +2,24 @@
 
     nominal    feedback linearisation with proportional-integral feedback (published.py), until Td
     from Td    G (1 + thetahat) u = xm' + Kp e + Ki int e - f - fhat(x, u, W),    e = xm - x
-               thetahat_s' = P{-gamma sum_i s_i G_is u_s}        first part: effectiveness of each surface
-               W_i' = P{-Gamma Phi(x, u) s_i}                    second part: a network
-               s = e + c int e
+               thetahat_s' = Proj{-gamma sum_i sigma_i G_is u_s}    first part: effectiveness of each surface
+               W_i' = Proj{-Gamma Phi(x, u) sigma_i}                second part: a network
+               sigma = e + c int e
+
+    Td, Tisol      s             times of detection and of isolation
+    e, sigma       rad/s         tracking error; signal from which both parts learn
+    thetahat_s     1             1 + thetahat is the estimated effectiveness of surface s
+    W, Phi         weights and basis of the network fhat, which estimates the unknown acceleration phi, rad/s2
+    gamma, Gamma   s2/rad2; of the network: gains of both parts
+    c              1/s           weight of the integral
 
 The paper leaves the design to its reference [11]; this is its pattern. With v = thetahat - theta and w = fhat
-- phi the error obeys e' = -Kp e - Ki int e + G v u + w - eta, and V = z' P z + |v|^2 / gamma + |W - W*|^2 /
-Gamma, z = (int e, e), falls along these two laws if s is the second row of P z, where A' P + P A = -Q for the
-error's A. For Q = diag(1, q), that row is, but for a factor, e + c int e with c = Kp / (q Ki + 1). There is
-no feedback of the FDAE's residual beside the two. From Tisol on the flap takes over from an elevator that is
-isolated (accommodation.py, allocation.py); the structure of the law stays.
+- phi, the error obeys e' = -Kp e - Ki int e + G v u + w - eta. The function V = z' P z + |v|^2 / gamma +
+|W - W*|^2 / Gamma, with z = (int e, e) and the best weights W*, falls along both laws if sigma is the second
+row of P z, where A' P + P A = -Q for the A of the error's equation. For Q = diag(1, q), this row is a
+multiple of e + c int e with c = Kp / (q Ki + 1). There is no further feedback of the residual of the FDAE.
+From Tisol on the flap takes over from an elevator that is isolated (accommodation.py, allocation.py); the
+structure of the law stays.
 """
 
 import numpy as np
@@ -31,9 +39,9 @@ from beaver_ftc.plugins import LAWS, settings
 from beaver_ftc.scenario.declared import Declared
 
 # adapts: whether any part adapts; networks: whether the second part does too. gain: gamma, s2/rad2.
-# integral_weight: c, 1/s. least, most: limits of an effectiveness, the projection P; infinite without it.
+# integral_weight: c, 1/s. least, most: limits of an effectiveness, the projection; infinite without it.
 CONFIG = record(adapts=int, networks=int, gain=float, integral_weight=float, least=float, most=float)
-MEMORY = record(signal=3)  # -s, rad/s, that both parts learn from
+MEMORY = record(signal=3)  # -sigma, rad/s, from which both parts learn
 
 
 @sized
@@ -76,9 +84,10 @@ def accommodate(control, assessment, faults, prediction, measured):
 
 @kernel
 def adapt(law, surfaces, main, saturated, error, G, u, dt):
-    """Advance both parts by a step of dt s, with signal = -s (3,), rad/s:
+    """Advance both parts by a step of dt s, with signal = -sigma (3,), rad/s:
 
-        s = e + c int e,    effectiveness_s <- P(effectiveness_s + dt gamma sum_i signal_i G_is u_s)
+        sigma = e + c int e
+        effectiveness_s <- Proj(effectiveness_s + dt gamma sum_i signal_i G_is u_s)
 
     error (3,) rad/s: e; G (3, n) rad/s2 per rad; u (n,) rad; gamma: config.gain, c: config.integral_weight.
     While the surface that leads an axis is at its stop, what the axis misses teaches nothing.

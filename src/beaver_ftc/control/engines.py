@@ -1,24 +1,24 @@
 """Engines as effectors: they take what surfaces no longer reach.
 
-If the surface that leads an axis is given up or at its stop, it leaves a part of the demand, the shortfall
-e. The engines are to give the integral w of the shortfall. With the lag of the engines, the loop is damped by
-0.7:
+If the surface that leads an axis is given up or at its stop, it does not give a part of the demand, the
+shortfall e, rad/s2. The engines are asked for the integral w of the shortfall, rad/s2. With the lag of the
+engines, s, the loop has a damping of 0.7:
 
     w' = e / T,   T = 2 lag,        w / demand = 1 / (T s (lag s + 1) + 1)
 
-So the engines take the slow part. The fast part, which they could only answer late, is left to the aircraft's
-own damping [Burcham1997]. The design model contains the moments of the engines (as signals), or the law's
-observer finds them: e is then only what the engines do not give yet. Once the surface reaches the demand
-again, w fades.
+So the engines take the slow part. The engines would answer the fast part late, so it is left to the own
+damping of the aircraft [Burcham1997]. The design model contains the moments of the engines (as signals), or
+the law's observer finds them: e is then only the part that the engines do not give yet. Once the surface
+reaches the demand again, w fades.
 
-Constrained least squares (least_squares.py) find which engine gives what. The unknowns are the accelerations
-u_k that engine k gives beyond the common lever, m/s2: thrust over mass of the aircraft. Column k of B is
+Constrained least squares (least_squares.py) distribute w to the engines. The unknowns are the accelerations
+u_k of the aircraft, m/s2, by which engine k exceeds the common lever: thrust over mass. Column k of B is
 
     share mass (0, down / Iy, -right / Iz)        rad/s2 per m/s2, for a force along the body's x axis
 
-and the inertia's coupling of yaw into roll. share: of engine k in the thrust; down, right, m: its distances
-from the centre of gravity. The table of thrust gives the lever for u_k. Engines are not asked for roll: the
-outer loops ask for sideslip, which rolls the aircraft.
+and the coupling of yaw into roll by the inertia. share: part of engine k in the thrust; down, right, m: its
+distances from the centre of gravity. The table of thrust gives the setting for u_k. Engines are not asked for
+roll: the outer loops demand sideslip, which rolls the aircraft.
 """
 
 import numpy as np
@@ -37,8 +37,8 @@ from beaver_ftc.scenario.declared import Declared
 LEAST_LAG_S = 0.5  # The law assumes at least this lag, so that it integrates no faster.
 RELEASE_S = 20.0  # time constant with which w fades
 
-# n: number of engines. low, high: range of the setting; step: its largest change in a frame, in units of the
-# setting. integral_gain: dt / T; release: dt / RELEASE_S. B (3, n): rad/s2 per m/s2.
+# n: number of engines that are effectors. low, high: range of the setting; step: its largest change in a
+# frame. integral_gain: dt / T; release: dt / RELEASE_S. B (3, n): rad/s2 per m/s2.
 ENGINES_CONFIG = record(
     n=int, low=float, high=float, step=float, integral_gain=float, release=float, B=(3, MAX_EFFECTORS)
 )  # fmt: skip
@@ -46,8 +46,8 @@ ENGINES_CONFIG = record(
 ENGINES_MEMORY = record(
     thrust=ENGINE, serving=(3, MAX_EFFECTORS), wanted=3, problem=problem_dtype(MAX_EFFECTORS),
 )  # fmt: skip
-# difference (n,): setting of each engine less that of the common lever; authority (2, 3) rad/s2: the least
-# and the greatest acceleration that all engines together give about each axis.
+# difference (n,): setting of each engine minus that of the common lever; authority (2, 3) rad/s2: the least
+# and the greatest acceleration that all engines together can give about each axis.
 ENGINES_OUTPUT = record(difference=MAX_EFFECTORS, authority=(2, 3))
 ENGINES = record(config=ENGINES_CONFIG, memory=ENGINES_MEMORY, output=ENGINES_OUTPUT)
 
@@ -55,11 +55,11 @@ ENGINES = record(config=ENGINES_CONFIG, memory=ENGINES_MEMORY, output=ENGINES_OU
 def configure_engines(engines: np.void, declared: Declared) -> None:
     """Fill the record (dtype ENGINES); it stays empty where no engine is an effector, or none may be used."""
     aircraft, dt, config = declared.aircraft, 1.0 / declared.rate_hz, engines["config"]
-    named, thrust = aircraft.file.power_setting, aircraft.engine.thrust
+    name_and_setting, thrust = aircraft.file.power_setting, aircraft.engine.thrust
     may_use = row_of(declared.control.law).uses_verdict and declared.control.power.enabled
-    if not aircraft.effectors or not may_use or named is None:
+    if not aircraft.effectors or not may_use or name_and_setting is None:
         return
-    low, high = named[1].range
+    low, high = name_and_setting[1].range
     T = 2.0 * max(thrust.lag_s if thrust else 0.0, LEAST_LAG_S)
     fill(
         config, n=len(aircraft.effectors), low=low, high=high, step=(high - low) / WHOLE_RANGE_S * dt,
@@ -108,7 +108,8 @@ def update_engine_demand(config, memory, axes, layout, saturated, surfaces):
 
 @kernel
 def limit(config, memory, authority, base):
-    """Limit u_k, m/s2, around the setting `base` of the common lever, and fill `authority` (2, 3) rad/s2:
+    """Fill the limits of u_k, m/s2, around the setting `base` of the common lever, and `authority` (2, 3)
+    rad/s2:
 
         |u_k| <= most = min(gain up to config.high, loss down to config.low)
         authority_i = -+ sum_k |B_ik| most
@@ -118,7 +119,7 @@ def limit(config, memory, authority, base):
     """
     problem, table = memory.problem, memory.thrust
     authority[:] = 0.0
-    # no push (thrust.py): an aircraft with such engines has a table
+    # 0.0 is the push (thrust.py), which is not used: an aircraft with such engines has a table
     most = min(gained(table, 0.0, base, config.high), -gained(table, 0.0, base, config.low))
     for k in range(config.n):
         problem.low[k], problem.high[k] = -most, most
@@ -135,7 +136,7 @@ def steer_by_engines(control, airspeed):
         u = argmin |B u - w|^2,    difference_k = setting for u_k - setting of the common lever
         w <- B u        (anti-windup: the integral keeps only what the engines give)
 
-    B: its rows in `serving`.
+    B: the rows of the axes that need engines, `serving`.
     """
     config, memory, output = control.engines.config, control.engines.memory, control.engines.output
     w, table, base = memory.wanted, memory.thrust, control.power.output.command[0]
@@ -149,7 +150,7 @@ def steer_by_engines(control, airspeed):
         u = memory.problem.u[k]
         for i in (PITCH, YAW):
             w[i] += memory.serving[i, k] * u
-        output.difference[k] = power_for(table, 0.0, base, u) - base  # no push, as in `limit`
+        output.difference[k] = power_for(table, 0.0, base, u) - base  # push 0.0: see `limit`
 
 
 @kernel

@@ -2,17 +2,22 @@
 
     min  |B u - d|^2 + slack sum (u - p)^2 / v        low <= u <= high        [Harkegard2002, Bodson2002]
 
-B (3, n) rad/s2 per rad: remaining effectiveness of each surface; d (3,) rad/s2: the demand; p (n,) rad:
-where a surface is that has nothing to do; v (n,) rad2: the weight of its movement, 0 for none. slack is small
-compared with B v B', so u gives as much of d as it can, and p and v choose among the ways to give it.
+    B            (3, n) rad/s2 per rad    remaining effect of each surface
+    d            (3,) rad/s2              demand
+    p            (n,) rad                 deflection that each surface prefers (u_preferred)
+    v            (n,) rad2                weight of its movement; with 0 it does not move from p
+    slack        (rad/s2)2                small compared with B v B'
+
+So u gives as much of d as it can, and p and v choose among the ways to give it. engines.py solves the same
+problem for the accelerations of engines, in other units.
 
 Primal active set [Nocedal2006, alg. 16.3]. With the surfaces at their limits held, the others follow from
 a system of three equations,
 
     (B v B' + slack I) y = d - B u0,      u = p + v B' y        u0: p, or the limit
 
-and y is the multiplier as well: a surface at its limit stays there while (u - p) / v - B' y pushes
-outwards. The set of the frame before is tried first: as a rule it is right, and one system is solved.
+and y (3,) is the multiplier as well: a surface at its limit stays there while (u - p) / v - B' y pushes
+outwards. The active set of the frame before is tried first. As a rule it is right, and one system is solved.
 """
 
 from math import sqrt
@@ -24,14 +29,14 @@ from beaver_ftc.compiled import kernel, record, sized
 LOW, FREE, HIGH = -1, 0, 1
 SLACK = 1e-10  # of the mean of B v B'
 LEAST_SLACK = 1e-14  # (rad/s2)^2, as B v B'
-ROUNDING = 1e-12  # rad: a surface this little inside of its limit stays there
+ROUNDING = 1e-12  # rad: a surface that would move inside its limit by less stays there
 
 
 @sized
 def problem_dtype(n: int) -> np.dtype:
-    """A problem of n surfaces and its solution u. side: LOW or HIGH where a limit holds the surface, else
-    FREE, kept for the next frame; y: the multipliers; S (3, 3): the matrix of their system, then its factor
-    L."""
+    """A problem of n surfaces and its solution u (n,) rad. u_preferred, weight: p, v. side (n,): LOW or HIGH
+    where a limit holds the surface, else FREE; it is kept for the next frame. y (3,): the multipliers; S (3,
+    3): the matrix of their system, then its factor L."""
     return record(u_preferred=n, weight=n, low=n, high=n, u=n, side=(int, n), y=3, S=(3, 3), slack=float)
 
 
@@ -39,8 +44,9 @@ def problem_dtype(n: int) -> np.dtype:
 def solve(problem, B, demand):
     """Fill u (n,) rad, from B (3, n) rad/s2 per rad and a demand d (3,) rad/s2.
 
-    Each pass moves one surface onto a limit or off it. When the passes are used up, u is within the limits
-    but perhaps not the minimum.
+    Each pass solves the system with the present active set, and then moves one surface onto a limit or off
+    it; without such a surface u is the minimum. After 4 n + 4 passes, u is within the limits, but perhaps not
+    the minimum.
     """
     warm_start(problem, B)
     n, u = problem.u.size, problem.u
@@ -49,9 +55,9 @@ def solve(problem, B, demand):
         blocking, share = blocking_surface(problem, B)
         for s in range(n):
             if problem.side[s] == FREE:
-                there = wanted(problem, B, s)
-                u[s] = u[s] + share * (there - u[s]) if blocking >= 0 else there
-        if blocking >= 0:  # it is put on the limit it has met
+                target = wanted(problem, B, s)
+                u[s] = u[s] + share * (target - u[s]) if blocking >= 0 else target
+        if blocking >= 0:  # the surface stays at the limit that it has met
             below = wanted(problem, B, blocking) < problem.low[blocking]
             problem.side[blocking] = LOW if below else HIGH
             u[blocking] = problem.low[blocking] if below else problem.high[blocking]
@@ -61,8 +67,8 @@ def solve(problem, B, demand):
 
 @kernel
 def warm_start(problem, B):
-    """Begin with the limits that held in the frame before: put u on them, and all within; and fill slack,
-    SLACK of the mean of the diagonal of B v B'."""
+    """Begin with the active set of the frame before: put its surfaces at their limits, and the others within
+    theirs. Fill slack, SLACK times the mean of the diagonal of B v B'."""
     total = 0.0
     for s in range(problem.u.size):
         if problem.side[s] == LOW:
@@ -77,7 +83,7 @@ def warm_start(problem, B):
 
 @kernel
 def wanted(problem, B, s):
-    """Where surface s goes without limits, rad: p + v B' y."""
+    """Deflection of surface s without limits, rad: p + v B' y."""
     y = problem.y
     along = B[0, s] * y[0] + B[1, s] * y[1] + B[2, s] * y[2]
     return problem.u_preferred[s] + problem.weight[s] * along
@@ -85,7 +91,7 @@ def wanted(problem, B, s):
 
 @kernel
 def multipliers(problem, B, demand):
-    """Fill y (3,), what is left of the demand over slack: the solution of
+    """Fill y (3,), the part of the demand that u does not give, over slack: the solution of
 
         S y = d - B u0,    S = B v B' + slack I        v of free surfaces alone; u0: p if free, else the limit
 
@@ -118,28 +124,28 @@ def multipliers(problem, B, demand):
 
 @kernel
 def blocking_surface(problem, B):
-    """The free surface that meets a limit first on its way, or -1, and which share of the way that is."""
+    """The free surface that meets a limit first on its way to `wanted`, -1 for none, and the share of the way
+    up to the limit, 0 to 1."""
     blocking, share = -1, 1.0
     for s in range(problem.u.size):
-        there, now = wanted(problem, B, s), problem.u[s]
-        if problem.side[s] == FREE and (there < problem.low[s] or there > problem.high[s]):
-            limit = problem.low[s] if there < problem.low[s] else problem.high[s]
-            part = (limit - now) / (there - now) if there != now else 0.0
-            if blocking < 0 or part < share:
-                blocking, share = s, part
+        target, u_s = wanted(problem, B, s), problem.u[s]
+        if problem.side[s] == FREE and (target < problem.low[s] or target > problem.high[s]):
+            limit = problem.low[s] if target < problem.low[s] else problem.high[s]
+            share_s = (limit - u_s) / (target - u_s) if target != u_s else 0.0
+            if blocking < 0 or share_s < share:
+                blocking, share = s, share_s
     return blocking, share
 
 
 @kernel
 def release(problem, B):
-    """Free the surface whose limit holds it back most, by side (u - (p + v B' y)) rad; returns whether there
-    is one."""
-    worst, most = -1, ROUNDING
+    """Free the surface that would move farthest inside its limit, by side (u - (p + v B' y)) rad; returns
+    whether there is one. side is 0 for a free surface."""
+    farthest, largest = -1, ROUNDING
     for s in range(problem.u.size):
-        # in rad: how far inside of its limit it would be; nothing of one that is free
         inside = problem.side[s] * (problem.u[s] - wanted(problem, B, s))
-        if inside > most:
-            worst, most = s, inside
-    if worst >= 0:
-        problem.side[worst] = FREE
-    return worst >= 0
+        if inside > largest:
+            farthest, largest = s, inside
+    if farthest >= 0:
+        problem.side[farthest] = FREE
+    return farthest >= 0

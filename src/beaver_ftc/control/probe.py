@@ -1,6 +1,10 @@
-"""The probe is active diagnosis: it moves flap and elevator against each other, and a healthy aircraft feels
-nothing of it. The flap goes down and back by (1 - cos phase) / 2; the allocation gives the elevator what the
-flap does not leave. A surface that does not follow then shows.
+"""The probe is active diagnosis: it moves flap and elevator against each other.
+
+The flap goes down and back, and the allocation gives the rest of the pitch demand to the elevator. On a
+healthy aircraft the two moments cancel. If a surface does not follow, they do not, and the diagnosis detects
+it.
+
+    deflection = amplitude (1 - cos phase) / 2,    phase = step frames        rad, of the flap
 """
 
 from math import pi, radians
@@ -13,7 +17,8 @@ from beaver_ftc.scenario.diagnosis import Probing
 # amplitude rad: largest deflection of the flap; step rad: change of the phase in a frame; frames: largest
 # number of frames of the movement, 0 for no probe.
 CONFIG = record(amplitude=float, step=float, frames=int)
-# deflection rad of the flap; probed: frames of the present movement; from_s, to_s: when it began and ended.
+# deflection rad of the flap; probed: frames of the present movement, 0 without one; from_s, to_s: when it
+# began and ended, s, -1 for never.
 MEMORY = record(deflection=float, probed=int, from_s=float, to_s=float)
 PROBE = record(config=CONFIG, memory=MEMORY)
 
@@ -30,10 +35,8 @@ def configure_probe(probe: np.void, probing: Probing | None, dt: float) -> None:
 
 @kernel
 def advance_probe(probe, wanted, t):
-    """Bring the probe to the next frame, t s: begin when wanted, end with the movement when no longer.
-
-    deflection = amplitude (1 - cos phase) / 2,    rad
-    """
+    """Bring the probe to the next frame, at t s. It begins once in a flight, when it is wanted. It ends at
+    rest, that is after a whole period, once it is no longer wanted or has its largest number of frames."""
     config, memory = probe.config, probe.memory
     if memory.probed == 0:
         if not wanted or memory.from_s >= 0.0:

@@ -1,8 +1,8 @@
-"""The profile that the autopilot flies: legs of altitude, airspeed, heading and bank, and how far it is off.
+"""The profile that the autopilot flies: legs of altitude, airspeed, heading and bank; deviations from it.
 
-A leg begins at an instant and moves its channel's command to a value, at most at its rate. The functions
-here write the fields of the autopilot's record (autopilot.py) that AUTOPILOT lists under "profile" and
-"deviations".
+A *channel* c is one of these four signals, in m, m/s and rad. A leg begins at an instant and moves the
+command of its channel to a value, at most at its rate. The functions here write the fields of the autopilot's
+record (autopilot.py) that AUTOPILOT lists under "Profile" and "Deviations".
 """
 
 from math import inf, nan, radians
@@ -18,30 +18,32 @@ N_CHANNELS = 4
 MAX_LEGS = 100
 CHANNELS = ("altitude_m", "airspeed_mps", "heading_deg", "bank_deg")
 _UNIT = dict(zip(CHANNELS, (1.0, 1.0, radians(1.0), radians(1.0)), strict=True))
-NOT_JUDGED = -1.0  # a deviation that no frame has counted for
-AT_ONE_INSTANT = "airspeed_at_one_instant_mps"  # the largest deviation, where `airspeed_mps` is of the mean
-LIMITED = "airspeed_limited_mps"  # the commanded one, as far as it can be held
+NOT_JUDGED = -1.0  # largest deviation of a channel of which no frame has counted
+AT_ONE_INSTANT = "airspeed_at_one_instant_mps"  # key of the largest deviation in a frame, not of the mean
+LIMITED = "airspeed_limited_mps"  # column of the airspeed to fly: the command, as far as it can be held
 COLUMNS = (
     "altitude_command_m", "airspeed_command_mps", "heading_command_rad", "bank_command_rad", LIMITED,
 )  # fmt: skip
-SETTLED_S = 30.0  # after the command of an angle has changed, before its deviation counts
+SETTLED_S = 30.0  # time after a change of the command of an angle before its deviation counts
 
 
 @kernel
 def clamp(value, most):
-    """value within -most and most."""
+    """The value, limited to -most and most."""
     return min(max(value, -most), most)
 
 
 @kernel
 def wrap_to_half_turn(angle):
-    """The same direction within half a turn, rad."""
+    """The same direction, as an angle from -pi to pi, rad."""
     return angle - 2.0 * np.pi * np.floor((angle + np.pi) / (2.0 * np.pi))
 
 
 @kernel
 def begin_leg(autopilot, c, now, t):
-    """Take up the next leg of channel c, which is at `now` as measured."""
+    """Begin the next leg of channel c at t s; now: its measured value, from which the command begins with the
+    first leg. A heading goes to the value by the shorter turn. A leg without a value (NaN) keeps the
+    command."""
     j = autopilot.next_leg_index[c]
     autopilot.next_leg_index[c] = j + 1
     if not autopilot.is_commanded[c]:
@@ -50,15 +52,16 @@ def begin_leg(autopilot, c, now, t):
     value = autopilot.leg_value[c, j]
     autopilot.goal[c] = autopilot.command[c]
     if not np.isnan(value):
-        away = value - autopilot.command[c]
-        autopilot.goal[c] += wrap_to_half_turn(away) if c == HEADING else away
+        change = value - autopilot.command[c]
+        autopilot.goal[c] += wrap_to_half_turn(change) if c == HEADING else change
         autopilot.changed_at_s[c] = t
     autopilot.max_command_rate[c] = autopilot.leg_max_command_rate[c, j]
 
 
 @kernel
 def advance_commands(autopilot, measured, t):
-    """Bring every channel's command to t s; measured (N_CHANNELS,): where they are."""
+    """Bring the command of each channel to t s, one step towards its goal, at most at its rate; measured
+    (N_CHANNELS,): the signals. A command that may change at once has the rate 0."""
     for c in range(N_CHANNELS):
         while (
             autopilot.next_leg_index[c] < autopilot.n_legs[c]
@@ -66,38 +69,42 @@ def advance_commands(autopilot, measured, t):
         ):
             begin_leg(autopilot, c, measured[c], t)
         if autopilot.is_commanded[c]:
-            away = autopilot.goal[c] - autopilot.command[c]
-            most = autopilot.max_command_rate[c] * autopilot.dt
-            step = clamp(away, most)
+            max_step = autopilot.max_command_rate[c] * autopilot.dt
+            step = clamp(autopilot.goal[c] - autopilot.command[c], max_step)
             autopilot.command[c] += step
-            autopilot.command_rate[c] = step / autopilot.dt if most < np.inf else 0.0
+            autopilot.command_rate[c] = step / autopilot.dt if max_step < np.inf else 0.0
 
 
 @kernel
 def record_deviations(autopilot, altitude_m, airspeed_mps, heading, bank, t):
-    """Update each commanded channel's deviation: `mean_deviation`, and the largest one so far. Of angles, it
-    counts once SETTLED_S have passed since the last change; of the airspeed, the mean counts."""
-    where = (altitude_m, airspeed_mps, heading, bank)
+    """Update the deviations of each commanded channel, signal - command, at t s:
+
+        mean_deviation <- mean_deviation + dt / MEAN_S (deviation - mean_deviation)
+        largest_deviation <- max(largest_deviation, |deviation|, for the airspeed |mean_deviation|)
+
+    Of an angle, the largest deviation counts once SETTLED_S have passed since the last change of its goal.
+    """
+    signals = (altitude_m, airspeed_mps, heading, bank)
     for c in range(N_CHANNELS):
         if not autopilot.is_commanded[c]:
             continue
-        away = where[c] - autopilot.command[c]
+        deviation = signals[c] - autopilot.command[c]
         if c == HEADING:
-            away = wrap_to_half_turn(away)
-        autopilot.mean_deviation[c] += autopilot.dt / MEAN_S * (away - autopilot.mean_deviation[c])
+            deviation = wrap_to_half_turn(deviation)
+        autopilot.mean_deviation[c] += autopilot.dt / MEAN_S * (deviation - autopilot.mean_deviation[c])
         if c == SPEED:
-            record_airspeed_deviations(autopilot, airspeed_mps, away)
-            away = autopilot.mean_deviation[c]
+            record_airspeed_deviations(autopilot, airspeed_mps, deviation)
+            deviation = autopilot.mean_deviation[c]
         if c in (ALTITUDE, SPEED) or t >= autopilot.changed_at_s[c] + SETTLED_S:
-            autopilot.largest_deviation[c] = max(autopilot.largest_deviation[c], abs(away))
+            autopilot.largest_deviation[c] = max(autopilot.largest_deviation[c], abs(deviation))
 
 
 @kernel
-def record_airspeed_deviations(autopilot, airspeed_mps, away):
-    """Update the largest deviation at one instant, of `away` m/s, and that of the mean from the airspeed to
-    fly."""
+def record_airspeed_deviations(autopilot, airspeed_mps, deviation):
+    """Update two more largest deviations of the airspeed: from the command at one instant (deviation, m/s),
+    and of the mean over MEAN_S from the airspeed to fly."""
     autopilot.largest_instant_airspeed_deviation = max(
-        autopilot.largest_instant_airspeed_deviation, abs(away)
+        autopilot.largest_instant_airspeed_deviation, abs(deviation)
     )
     mean = autopilot.mean_deviation_from_airspeed_to_fly
     mean += autopilot.dt / MEAN_S * (airspeed_mps - autopilot.airspeed_to_fly - mean)
@@ -108,7 +115,7 @@ def record_airspeed_deviations(autopilot, airspeed_mps, away):
 
 
 def set_up_profile(autopilot: np.void, declared: Declared) -> None:
-    """Fill in the legs; in flight too, where those that have been begun are the same as before."""
+    """Fill the legs. A change in flight fills them again; the legs that have begun must then be the same."""
     for c, (name, unit) in enumerate(_UNIT.items()):
         legs = getattr(declared.autopilot, name)
         autopilot["n_legs"][c] = len(legs)

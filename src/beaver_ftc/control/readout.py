@@ -1,4 +1,4 @@
-"""The law at one frame, as studies read it. `control` is a record of `state.control_dtype`."""
+"""The control stage in one frame, as studies read it. `control` is a record of `state.control_dtype`."""
 
 from functools import cached_property
 from typing import NamedTuple
@@ -24,7 +24,7 @@ class DefaultLaw(NamedTuple):
 
 
 class ControlReadout:
-    """The law at the frame in which it is read first."""
+    """Each part of the control stage, as it is in the frame in which this part is read first."""
 
     def __init__(self, control: np.void) -> None:
         self._control = control

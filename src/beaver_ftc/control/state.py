@@ -30,20 +30,22 @@ from beaver_ftc.scenario.declared import Declared
 
 FILES: dict[str, CompiledLaw] = {file_of(module): import_module(module).LAW for module in MODULES}
 
+# Kernels that call that of the law by its place: accommodate(place, ...), command(place, ...). A law without
+# `accommodate` has the common one.
 accommodate = one_of(
-    {law: of.accommodate for law, of in enumerate(FILES.values()) if of.accommodate},
+    {place: law.accommodate for place, law in enumerate(FILES.values()) if law.accommodate},
     accommodation.accommodate,
 )
-_COMMANDS = [of.command for of in FILES.values()]
+_COMMANDS = [law.command for law in FILES.values()]
 command = one_of(dict(enumerate(_COMMANDS[1:], 1)), _COMMANDS[0])
 
 
 # law: place of its file in FILES. uses_verdict, reallocates, informed: what plugins.yaml says of the law.
 CONFIG = record(law=int, uses_verdict=int, reallocates=int, informed=int)
 
-# Records that a law takes over from the law before it. KEPT: the state of the reference, the positions of
-# surfaces and engine. KNOWN: what the law before found of the surfaces, unless it was informed of the truth.
-# All other records restart.
+# Records (stage, part) that a law takes over from the law before it. KEPT: the state of the reference, the
+# positions of surfaces and engine. KNOWN: what the law before assumed of the surfaces, unless it was informed
+# of the truth and the new law is not. All other records restart.
 KEPT = ("reference", "output"), ("allocation", "output"), ("probe", "memory"), ("power", "output")
 KNOWN = ("surfaces", "output"), ("power", "memory")
 
@@ -59,7 +61,9 @@ def control_dtype(n: int) -> np.dtype:
 
 
 def configure(control: np.void, declared: Declared, travel: np.ndarray) -> None:
-    """Fill the records that all laws share; travel (2, n) rad: the stops. The law's own: `configure_law`."""
+    """Fill the records that all laws share; travel (2, n) rad: the stops. `configure_law` fills that of the
+    law. The order matters: allocation reads the frame of the reference, and power the layout of
+    allocation."""
     config, dt, row = declared.control, 1.0 / declared.rate_hz, row_of(declared.control.law)
     control["config"] = row.place, row.uses_verdict, row.reallocates, row.informed
     configure_reference(control["reference"], config, dt)
@@ -79,17 +83,19 @@ def configure_law(control: np.void, prediction: np.void, declared: Declared, y: 
 
 
 def is_told_no_more(new: np.void, before: np.void) -> bool:
-    """Whether the law in `before` knows the true effectiveness and the one in `new` does not."""
+    """Whether the law in `before` was informed of the truth and the one in `new` is not."""
     return bool(before["config"]["informed"] and not new["config"]["informed"])
 
 
 def take_over(new: np.void, before: np.void, learnt: np.ndarray) -> None:
-    """Let a law, configured in `new`, take over from the one in `before` without a bump: the stages in KEPT
-    go on, and its integrators begin where the demand is. Of a law that knew the truth, what that has left in
-    a stage does not go on.
+    """Let a law, configured in `new`, take over from the one in `before` without a bump: the records in KEPT
+    and KNOWN go on, and its integrators begin with the present demand.
 
-    learnt (3,) rad/s2: what the diagnosis' network explains. source: the records with which the integrators
-    may begin; unexplained (3,) rad/s2: what the law in them attributes to no model.
+    If the law loses the truth (`is_told_no_more`), the effects of the truth must not go on: KNOWN restarts,
+    and so do the hand-over of pitch, the governing of the reference, and the integrators.
+
+    learnt (3,) rad/s2: part that the network of the diagnosis explains. source: the records with which the
+    integrators may begin; unexplained (3,) rad/s2: acceleration that the law in them attributes to no model.
     """
     loses_truth = is_told_no_more(new, before)
     for stage, part in KEPT if loses_truth else (*KEPT, *KNOWN):
@@ -109,5 +115,5 @@ def take_over(new: np.void, before: np.void, learnt: np.ndarray) -> None:
 
 
 def in_charge(control: np.void) -> CompiledLaw:
-    """The law that a record flies by."""
+    """The law in charge in these records."""
     return list(FILES.values())[int(control["config"]["law"])]

@@ -4,10 +4,11 @@ If the engine is a piston engine whose slipstream is among the forces, its thrus
 manifold pressure, taken at the present state. Any other engine has a table of steady thrust over airspeed and
 setting, `engine.thrust` of the aircraft's file.
 
-    power       engine setting, in its own units: inHg of a piston engine
-    trim        the setting in trim, same units
+    power       setting of the engine, in its own unit: inHg of a piston engine
+    trim        the setting in trim, same unit
     push        slope of the acceleration over the setting, m/s2 per unit; used if there is no table
     engine      record, ENGINE
+    gain        acceleration along the path, m/s2, by a setting in addition to that by another
 """
 
 from typing import Any
@@ -18,13 +19,13 @@ from beaver_ftc.aircraft.schema import MAX_THRUST
 from beaver_ftc.compiled import kernel, record
 from beaver_ftc.design.table import DPT, QDYN
 
-LEAST_PUSH = 1e-3  # smallest push, m/s2 per inHg
+LEAST_PUSH = 1e-3  # smallest push, m/s2 per inHg: power_for divides by it
 LEAST_RISE = 1e-4  # added from one setting to the next, m/s2, so that no two settings have the same thrust
 
 # The table of an engine; `settings` is 0 if there is none.
 ENGINE = record(
     settings=int, airspeeds=int,  # how many of each are in use
-    setting=MAX_THRUST, airspeed=MAX_THRUST,  # both rising; in units of the setting, m/s
+    setting=MAX_THRUST, airspeed=MAX_THRUST,  # points of the table, both ascending; unit of the setting, m/s
     table=(MAX_THRUST, MAX_THRUST),  # [airspeed, setting]: thrust over mass, m/s2
     now=MAX_THRUST,  # by setting, at the airspeed of the frame: thrust over mass, m/s2
 )  # fmt: skip
@@ -61,31 +62,33 @@ def look_up(engine, airspeed):
 
 
 @kernel
-def thrust_per_inhg(thrust, alpha, airspeed, control, y):
-    """Acceleration along the path per inHg of manifold pressure, m/s2, and no less than LEAST_PUSH.
+def thrust_per_inhg(thrust, alpha, airspeed, power, y):
+    """The push of a piston engine, m/s2 per inHg of manifold pressure P, and no less than LEAST_PUSH:
 
-        d/dinHg [qdyn (thrust[0] dpt + thrust[1] alpha dpt^2)]
+        d/dP [qdyn (thrust[0] dpt + thrust[1] alpha dpt^2)],    d dpt / d P = dpt_factor / (2 qdyn V)
 
     thrust (2,), m/s2 per Pa: acceleration by dpt, and by dpt^2 per rad of alpha, over qdyn. alpha rad,
-    airspeed m/s; control: POWER record of power.py; y: readings.
+    airspeed V m/s; power: POWER record of power.py; y: measured signals.
     """
-    dpt_per_inhg = control.config.dpt_factor / (2.0 * y[QDYN] * airspeed)
+    dpt_per_inhg = power.config.dpt_factor / (2.0 * y[QDYN] * airspeed)
     slope = thrust[0] + 2.0 * thrust[1] * alpha * y[DPT]
     return max(y[QDYN] * slope * dpt_per_inhg, LEAST_PUSH)
 
 
 @kernel
 def gained(engine, push, trim, power):
-    """How much more acceleration the setting `power` gives than the setting `trim`, m/s2."""
+    """The gain of the setting `power` over the setting `trim`, m/s2: push (power - trim), or the difference
+    of both in the table at the airspeed of the frame (`look_up`)."""
     if engine.settings == 0:
         return push * (power - trim)
-    there = between(power, engine.settings, engine.setting, engine.now)
-    return there - between(trim, engine.settings, engine.setting, engine.now)
+    acceleration = between(power, engine.settings, engine.setting, engine.now)
+    return acceleration - between(trim, engine.settings, engine.setting, engine.now)
 
 
 @kernel
 def power_for(engine, push, trim, acceleration):
-    """The setting that gives `acceleration`, m/s2, more than the setting `trim`: the inverse of `gained`."""
+    """The setting whose gain over the setting `trim` is `acceleration`, m/s2: the inverse of `gained`, within
+    the table."""
     if engine.settings == 0:
         return trim + acceleration / push
     wanted = acceleration + between(trim, engine.settings, engine.setting, engine.now)

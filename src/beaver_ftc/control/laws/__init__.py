@@ -1,9 +1,13 @@
-"""The control laws of ours, one a file, and what those that invert the design model share: they decide which
-surfaces carry pitch, turn a demand into the command, and compute what of the demand is then missing.
+"""Our control laws, one in each file, and the steps that the laws share which invert the design model.
 
-    prepare -> the law's own demand -> command_surfaces -> the law's own integrators -> complete
+    prepare               decides which surfaces carry pitch
+    the law's own demand
+    command_surfaces      turns the demand into the command of each surface
+    the law's own integrators
+    complete              computes the shortfall of the demand, and leaves it to the engines
 
-`control/state.py` has the table of the laws, reference.py what they follow. Words for a surface at fault:
+`control/state.py` has the table of the laws, reference.py the reference that they follow. Words for a surface
+at fault:
 
     given up    a law divides by no effectiveness of it: less is left than `least_effectiveness`
     withdrawn   given up by the default law's own observer, perhaps for a while (withdrawal.py)

@@ -60,9 +60,9 @@ def add_command(law, dt, rate, acceleration, main, x, Gu, G, demand, u):
 
 
 @kernel
-def missed(memory, dt, i, e):
-    """Integrate the tracking error e of axis i, rad/s, unless a surface is at its stop; returns the
-    integral."""
+def integrate_error(memory, dt, i, e):
+    """Integrate the tracking error e of axis i, rad/s, unless a surface is at its stop; returns the integral,
+    rad."""
     if not memory.saturated:
         memory.integral[i] += dt * e
     return memory.integral[i]
@@ -70,37 +70,42 @@ def missed(memory, dt, i, e):
 
 @kernel
 def regulate(law, dt, rate, acceleration, main, x, u):
-    """u <- u + B^-1 (xm' - A (xm - x_trim)) + K (e, int e),    e = xm - x, rad/s; u (n,) rad, its leading
-    surfaces alone."""
+    """The regulator, for the leading surfaces of u (n,) rad:
+
+    u <- u + B^-1 (xm' - A (xm - x_trim)) + K (e, int e),    e = xm - x, rad/s
+    """
     config = law.config
     for i in range(3):
         e = rate[i] - x[i]
-        integral = missed(law.memory, dt, i, e)
+        integral = integrate_error(law.memory, dt, i, e)
         needed = acceleration[i]
         for j in range(3):
             needed -= config.A[i, j] * (rate[j] - config.trim_x[j])
         for s in range(3):
-            back = config.K[s, i] * e + config.K[s, 3 + i] * integral
-            u[main[s]] += config.B_inverse[s, i] * needed + back
+            feedback = config.K[s, i] * e + config.K[s, 3 + i] * integral
+            u[main[s]] += config.B_inverse[s, i] * needed + feedback
 
 
 @kernel
 def increment(law, dt, rate, acceleration, main, x, Gu, G, demand, u):
-    """u <- G^-1 (nu - xdot0 + G u0),    nu = xm' + Kp e + Ki int e;    demand: nu - xdot0.
+    """Incremental inversion, for the leading surfaces of u (n,) rad; fills demand = nu - xdot0, rad/s2:
 
-    xdot0 and G u0 pass the same filter.
+        u <- G^-1 (nu - xdot0 + G u0),    nu = xm' + Kp e + Ki int e,    e = xm - x
+
+    xdot0: measured acceleration; G u0: acceleration by the positions of these surfaces over the elapsed
+    frame. Both pass the same filter. In the first frame, both have their initial values.
     """
     config, memory = law.config, law.memory
     for i in range(3):
         e = rate[i] - x[i]
-        integral = missed(memory, dt, i, e)
+        integral = integrate_error(memory, dt, i, e)
         xdot0, given = memory.rate_filter[1, i], memory.surface_filter[1, i]
         if memory.begun:
             xdot0 = smooth(memory.rate_filter, i, (x[i] - memory.x_before[i]) / dt, config.keep)
-            moved = 0.0  # acceleration by the positions of these surfaces over the elapsed frame
+            by_surfaces = 0.0
             for s in main:
-                moved += Gu[i, s]
-            given = smooth(memory.surface_filter, i, moved, config.keep)
+                by_surfaces += Gu[i, s]
+            given = smooth(memory.surface_filter, i, by_surfaces, config.keep)
         demand[i] = acceleration[i] + config.Kp * e + config.Ki * integral - xdot0 + given
     solve(G, main, demand, u)
     for i in range(3):
@@ -110,8 +115,8 @@ def increment(law, dt, rate, acceleration, main, x, Gu, G, demand, u):
 
 @kernel
 def smooth(filtered, i, value, keep):
-    """Two equal filters in series, y <- keep y + (1 - keep) input, each holds its input over the frame;
-    filtered (2, 3): outputs of the first and the second, in place. Returns that of the second, axis i."""
+    """Pass a value of axis i through two equal filters in series, y <- keep y + (1 - keep) input; filtered
+    (2, 3): their outputs, in place. Returns the output of the second."""
     filtered[0, i] = keep * filtered[0, i] + (1.0 - keep) * value
     filtered[1, i] = keep * filtered[1, i] + (1.0 - keep) * filtered[0, i]
     return filtered[1, i]

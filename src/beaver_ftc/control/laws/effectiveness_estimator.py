@@ -6,17 +6,23 @@ with
     e' = a - dd,    innovation = e before correction
     e <- (1 - L_rate) innovation,    dd <- dd + L_disturbance innovation
 
-which takes out what changes slowly: gusts, wrong coefficients. a: rad/s2; e, error of the rate, and
-innovation: rad/s; dd, part of a that the observer has found: rad/s2. After damage that is in no list of
+    a              rad/s2    acceleration that is not in the model
+    e, innovation  rad/s     error of the rate, after and before the correction
+    dd             rad/s2    part of a that the observer has found
+
+So the innovation does not contain slow changes: gusts, wrong coefficients. After damage that is in no list of
 faults
 
     a_i = sum_s theta_s G_is u_s + sum_j A_ij y_j,       -1 <= theta_s <= 0,       y: alpha, beta, p, q, r
 
-theta_s is the lost effectiveness of surface s, and G u what healthy surfaces would give. A is what the
-airframe does otherwise, for instance a yaw by sideslip that has changed its sign: without A the rudders would
-be blamed for what they answer. theta and A follow by recursive least squares from all three axes at once
-[Ljung1999, ch. 11]. A theta beyond its limits is put back, the others with it along the covariance: to the
-likeliest place within, never further from the truth.
+    theta_s        1             lost effectiveness of surface s
+    G_is u_s       rad/s2        acceleration of axis i by the healthy surface s
+    A              (3, 5), 1/s2 and 1/s     other changes of the airframe
+
+An example of A is a yaw by sideslip that has changed its sign. Without A, the estimate would assign this yaw
+to the rudders, which act against it. theta and A follow by recursive least squares from all three axes at
+once [Ljung1999, ch. 11]. A theta beyond its limits is put back to the limit, and all other parameters move
+with it along the covariance, to the most likely values.
 """
 
 import numpy as np

@@ -23,13 +23,13 @@ from beaver_ftc.compiled import kernel, record
 from beaver_ftc.control.laws.effectiveness_estimator import observer_response
 
 MEMORY_S = 5.0  # time constant of the sums: the swing of a slow reference
-UNSURE = 0.2  # assumed standard deviation of the diagnosis' estimate, which the law takes before it has sums
+UNSURE = 0.2  # assumed standard deviation of the diagnosis' estimate
 # A surface with less effectiveness counts as lost: half of the default `least_effectiveness`, also if a
 # scenario sets another one.
 NOTHING_LEFT = 0.05
 
-# Fading sums over frames (3,), for the main surface of each axis: product of psi e, square of psi^2,
-# innovation of e^2, (rad/s)^2, and frames of 1. named: whether the diagnosis has named the surface before.
+# Fading sums over frames (3,), for the main surface of each axis: product, of psi e; square, of psi^2;
+# innovation, of e^2, all (rad/s)^2; frames, of 1. named: whether the diagnosis has named the surface before.
 SUMS = record(product=3, square=3, innovation=3, frames=3, named=(int, 3))
 
 
@@ -63,7 +63,7 @@ def effectiveness_seen(sums, i, diagnosed):
 
         theta = (sum psi e + lam (diagnosed - 1)) / (sum psi^2 + lam),    lam = sum e^2 / frames / UNSURE^2
 
-    diagnosed: by the diagnosis, which is returned while nothing has been seen.
+    `diagnosed` is returned while the sums are empty.
     """
     if sums.frames[i] == 0.0:
         return diagnosed

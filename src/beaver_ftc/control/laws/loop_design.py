@@ -1,13 +1,19 @@
-"""The gains of the default law (rejecting.py), a loop at a time, from what is declared.
+"""The gains of the default law (rejecting.py), loop by loop, from the declaration.
 
-Two numbers are chosen, by flights in turbulence beside the rivals: RATIO, and the share of an actuator's
-rate that noise may take (`noise_share`). w_o, Kp and the lead follow. One number s, 1/s, sets feedback Kp = s
-and observer w_o = RATIO s of a loop. It is the largest that leaves the margins asked for with the declared
-actuator, one JSBSim frame of delay, the frame rate, and the gyro's declared lag and delay; and, where gyros
-are noisy, that moves the surface no faster than a share of its rate limit. The plant of a loop is an
-integrator, the inversion having made it one: the margins are those of this design loop, with a reserve for
-the rest of the aircraft. A loop's response is found a frequency at a time from the equations of the law,
+One number s, 1/s, gives feedback Kp = s and observer w_o = RATIO s of a loop. It is the largest s that
+
+- leaves the declared margins, with the declared actuator, one JSBSim frame of delay, the frame rate, and the
+  declared lag and delay of the gyro;
+- where gyros are noisy, moves the surface by noise no faster than a share of its rate limit (`noise_share`).
+
+RATIO and noise_share were chosen by flights in turbulence, compared with the rivals. The inversion makes the
+plant of a loop an integrator. The margins are those of this design loop, with a reserve for the rest of the
+aircraft. The response of a loop follows, frequency by frequency, from the equations of the law,
 z-transformed.
+
+    z            (n,), exp(i omega dt) at the frequencies omega, rad/s
+    loop         the data of a loop, `Loop`
+    L            (n,), response of the open loop
 """
 
 from dataclasses import dataclass
@@ -16,18 +22,23 @@ from math import inf, pi, sqrt
 
 import numpy as np
 
-RATIO = 6.5  # observer over feedback: of those with the same margins, near the least error in turbulence
+RATIO = 6.5  # w_o / Kp: among ratios with the same margins, its error in turbulence is near the least
 MOST_LEAD = 4.0  # lead compensation makes an actuator at most this many times as fast
-RESERVE_DB, RESERVE_DEG = 0.5, 2.0  # kept for what an integrator is not: the rest of the aircraft
+RESERVE_DB, RESERVE_DEG = 0.5, 2.0  # added to the margins, because the aircraft is not quite an integrator
 N_FREQUENCIES, N_CANDIDATES = 160, 40
 LEAST_PER_S = 0.5  # s of the slowest loop, which is taken even if it leaves less than the margins
 
 
 @dataclass(frozen=True)
 class Loop:
-    """What limits one loop. dt_s: length of a frame. share: part of a frame until a command acts. approach:
-    part of the way to its command that the actuator goes in a frame. lead: command beyond the actuator's
-    position over what is wanted beyond it. delay_s, keep: the gyro's delay, and the pole of its lag."""
+    """The data that limit one loop.
+
+    dt_s            length of a frame
+    share           part of a frame until a command acts
+    approach        part of the way to its command that the actuator goes in a frame
+    lead            factor on the wanted motion: command - position = lead (wanted - position)
+    delay_s, keep   delay of the gyro, and pole of its lag over a frame
+    """
 
     dt_s: float
     share: float
@@ -38,13 +49,13 @@ class Loop:
 
 
 def lead_of(approach: float) -> float:
-    """lead = 1 / approach, from 1 to MOST_LEAD: an actuator that goes this share of the way in a frame is
-    there after one, and never overshoots."""
+    """lead = 1 / approach, from 1 to MOST_LEAD: with it, an actuator that goes the share `approach` of its
+    way in a frame reaches the wanted position after one frame, and never overshoots."""
     return 1.0 / min(max(approach, 1.0 / MOST_LEAD), 1.0)
 
 
 def frequencies(dt_s: float) -> np.ndarray:
-    """From far below any loop to Nyquist, rad/s."""
+    """Frequencies (N_FREQUENCIES,) rad/s, from far below any loop to Nyquist."""
     return np.geomspace(0.002 / dt_s, pi / dt_s, N_FREQUENCIES)
 
 
@@ -103,12 +114,15 @@ def open_loop(loop: Loop, s: float, z: np.ndarray) -> np.ndarray:
 
 
 def margins(L: np.ndarray) -> tuple[float, float, float]:
-    """Upper and lower gain margin, dB, and phase margin, deg, of an open loop sampled along the frequencies.
+    """Upper and lower gain margin, dB, and phase margin, deg, of an open loop L (n,) along the frequencies:
 
-    Between two samples L is taken as straight in log magnitude and phase. At the last one, Nyquist perhaps,
-    L is real: a crossing if negative. `control.stability_margins` of the sampled loop agrees to 0.1 %, and
-    takes 300 times as long for each of the candidates that a flight's gains are chosen from. A surface that
-    does not move closes no loop.
+        gain margins     distance of the level from 0 dB where L is real and negative
+        phase margin     distance of the phase from -180 deg where the level is 0 dB
+
+    Between two samples, log magnitude and phase of L are taken as linear. At the last sample, which may be
+    Nyquist, L is real: a crossing if it is negative. `control.stability_margins` of the sampled loop agrees
+    to 0.1 %, but takes 300 times as long, and a flight has many candidates. If L is 0 (a surface that does
+    not move), all margins are infinite.
     """
     if not L.any():
         return inf, inf, inf
@@ -117,18 +131,18 @@ def margins(L: np.ndarray) -> tuple[float, float, float]:
     if L[-1].real < -abs(L[-1].imag) * 1e6:
         upper, lower = (-level[-1], inf) if level[-1] < 0.0 else (inf, level[-1])
     for turn in (-1260.0, -900.0, -540.0, -180.0, 180.0):  # deg, where L is real and negative
-        at = _where(phase - turn, level)
-        upper = min([upper, *(-x for x in at if x < 0.0)])
-        lower = min([lower, *(x for x in at if x >= 0.0)])
-    away = [abs((x + 180.0) % 360.0) for x in _where(level, phase)]
-    return upper, lower, min([inf, *(min(x, 360.0 - x) for x in away)])
+        levels = _at_zeros(phase - turn, level)
+        upper = min([upper, *(-x for x in levels if x < 0.0)])
+        lower = min([lower, *(x for x in levels if x >= 0.0)])
+    distances = [abs((x + 180.0) % 360.0) for x in _at_zeros(level, phase)]
+    return upper, lower, min([inf, *(min(x, 360.0 - x) for x in distances)])
 
 
-def _where(of: np.ndarray, value: np.ndarray) -> list[float]:
-    """`value` (n,) wherever `of` (n,) passes zero, both taken as straight between two samples."""
-    i = np.flatnonzero(np.signbit(of[:-1]) != np.signbit(of[1:]))
-    part = of[i] / (of[i] - of[i + 1])
-    return list(value[i] + part * (value[i + 1] - value[i]))
+def _at_zeros(x: np.ndarray, y: np.ndarray) -> list[float]:
+    """The values of y (n,) at which x (n,) passes zero, both linear between two samples."""
+    i = np.flatnonzero(np.signbit(x[:-1]) != np.signbit(x[1:]))
+    part = x[i] / (x[i] - x[i + 1])
+    return list(y[i] + part * (y[i + 1] - y[i]))
 
 
 def noise_speed(loop: Loop, s: float, z: np.ndarray, omega: np.ndarray) -> float:
@@ -167,8 +181,9 @@ def candidates(loop: Loop, gain_db: float, phase_deg: float) -> tuple[np.ndarray
 def fastest(
     loop: Loop, margin: tuple[float, float], noise_rad_s: float, G: float, speed_rad_s: float
 ) -> float:
-    """The largest s, 1/s, for these margins (dB, deg) and at most this mean surface speed from noise: of the
-    candidates, log s over log noise speed is taken as straight. G rad/s2 per rad."""
+    """The largest s, 1/s, with these margins (dB, deg), and with a standard deviation of the surface's speed
+    from noise of at most speed_rad_s. Between candidates, log s is linear over the log of the noise speed. G
+    rad/s2 per rad; noise_rad_s: standard deviation of a sample of the gyro."""
     values, speeds = candidates(loop, *margin)
     if noise_rad_s <= 0.0:
         return float(values[-1])

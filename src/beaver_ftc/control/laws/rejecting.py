@@ -5,15 +5,16 @@
 
     x, xhat, xm   (3,) rad/s      body rates: measured, of the observer, of the reference model
     x+            (3,) rad/s      xhat at the instant from which the command acts (`look_ahead`)
+    e             (3,) rad/s      innovation of the observer, x - xhat
     d             (3,) rad/s2     disturbance
     f, G          (3,), (3, n)    design model: rad/s2 without surfaces, rad/s2 per rad
-    u, u_c        (n,) rad        where the actuators are; command
+    u, u_c        (n,) rad        positions of the actuators; command
     w_o, Kp       1/s             bandwidth of the observer, feedback
 
-d is what the model does not explain: rotation of the air, wrong coefficients, a fault that is not named
-yet. u is where the actuators are, not their command. So neither their lag nor their stops count as a
-disturbance, and nothing can wind up. The command acts one JSBSim frame from now, and xm is taken at that
-instant too.
+d is the acceleration that the model does not explain: rotation of the air, wrong coefficients, a fault that
+is not named yet. u are the positions of the actuators, not their commands. So neither their lag nor their
+stops count as a disturbance, and nothing can wind up. The command acts one JSBSim frame from now, and xm is
+taken at that instant too.
 
 Gains. A loop has Kp = s and w_o = RATIO s; loop_design.py derives s, 1/s, from what is declared.
 
@@ -96,7 +97,7 @@ def configure(law: np.void, control: np.void, prediction: np.void, declared: Dec
 
 
 def allowed_speeds(declared: Declared, loops: list[tuple[int, int]], D: np.ndarray) -> dict[int, float]:
-    """The speed, rad/s, at which a gyro's noise may move the surface s of each loop (axis, s):
+    """The speed, rad/s, at which the noise of a gyro may move the surface s of each loop (axis, s):
 
         noise_share sqrt(D_axis / D_max) rate limit        D (3,) 1/s: own damping of the axes; D_max: largest
 
@@ -120,17 +121,23 @@ def schedule_points(declared: Declared, y: np.ndarray) -> np.ndarray:
     return points
 
 
-# xhat and d: rate (3,) rad/s, disturbance (3,) rad/s2. begun: whether they are estimates yet. A change of law
+# xhat and d: rate (3,) rad/s, disturbance (3,) rad/s2. begun: whether the observer has begun. A change of law
 # keeps this record.
 OBSERVER = record(begun=int, rate=3, disturbance=3)
 
 
 @sized
 def config_dtype(n: int) -> np.dtype:
-    """dt s: length of a frame. share: part of a frame that passes until a command acts. qdyn (N_POINTS,) Pa:
-    the schedule's points, ascending. Kp_at 1/s, L_rate_at 1, L_disturbance_at 1/s (N_LOOPS, N_POINTS): gains
-    of feedback and observer. lead (n,): command beyond the actuator's position over what is wanted beyond it.
-    fading: share of SUMS that is forgotten in a frame."""
+    """Configuration for n surfaces.
+
+    dt                                    s, length of a frame
+    share                                 part of a frame until a command acts
+    fading                                share of SUMS (evidence.py) that is forgotten in a frame
+    qdyn (N_POINTS,)                      Pa, points of the schedule, ascending
+    Kp_at (N_LOOPS, N_POINTS)             1/s, gain of the feedback
+    L_rate_at, L_disturbance_at (same)    1 and 1/s, gains of the observer
+    lead (n,)                             factor on command - position (`allocation.lead_compensate`)
+    """
     table = (N_LOOPS, N_POINTS)
     return record(
         dt=float, share=float, fading=float, qdyn=N_POINTS, Kp_at=table, L_rate_at=table,
@@ -140,9 +147,16 @@ def config_dtype(n: int) -> np.dtype:
 
 @sized
 def memory_dtype(n: int) -> np.dtype:
-    """Kp, L_rate, L_disturbance (3,): the gains of this frame. ahead (3,) rad/s: x+. innovation (3,) rad/s:
-    e. at_stop_s, out_of_use_s, withdrawn (n,): see `withdraw`. healthy, assumed: answers of the observer to
-    the moments of healthy main surfaces, and to the assumed moments minus these; sums: see `accumulate`."""
+    """Memory for n surfaces.
+
+    Kp, L_rate, L_disturbance (3,)          gains of this frame
+    ahead, innovation (3,)                  rad/s, x+ and e
+    at_stop_s, out_of_use_s, withdrawn (n,) see withdrawal.py
+    healthy, assumed                        answers of the observer to the moments of healthy main surfaces,
+                                            and to the assumed moments minus these (evidence.py)
+    sums                                    see `accumulate`
+    estimator                               see effectiveness_estimator.py
+    """
     return record(
         Kp=3, L_rate=3, L_disturbance=3, ahead=3, innovation=3, at_stop_s=n, out_of_use_s=n,
         withdrawn=(int, n), healthy=OBSERVER_ERROR, assumed=OBSERVER_ERROR, sums=SUMS,
@@ -158,14 +172,16 @@ def rejecting_dtype(n: int) -> np.dtype:
 
 @apart
 def accommodate(control, assessment, faults, prediction, measured):
-    """Bring the effectiveness of all surfaces to this frame (control.CompiledLaw).
+    """Bring the effectiveness of all surfaces to this frame (control.CompiledLaw). A law that is informed
+    takes the truth. Otherwise the target of a surface is
 
-    A law that is informed takes the truth. Otherwise the target is the diagnosis' estimate, except that
+        no known fault fits, and the estimator is active    its estimate
+        a loss of a main surface that no other replaces     the larger of the diagnosis' and the observer's
+                                                            (`larger_estimate`)
+        otherwise                                           the diagnosis' estimate
 
-    - the estimator gives it once no known fault fits (`no_target`);
-    - for a loss of a surface that leads an axis and that no other replaces, the observer's estimate is taken
-      if it is larger (`larger_estimate`), unless the diagnosis gives the surface up or holds its estimates;
-    - a surface that is withdrawn is given up.
+    The second row needs a surface that the diagnosis does not give up, and estimates that it does not hold.
+    A surface that is withdrawn is given up, whatever its target.
     """
     if control.config.informed:
         accommodation.accommodate(control, assessment, faults, prediction, measured)
@@ -229,8 +245,8 @@ def schedule(config, memory, qdyn, transfer_share):
 
 @kernel
 def start_or_end_estimator(memory, layout, detected, dt):
-    """Let the estimator be active from the alarm on, if more surfaces move than lead an axis or stand in. Its
-    noise model is that of the innovation up to the alarm."""
+    """Activate the estimator at the alarm, if the allocation is general and the estimator has room for all
+    surfaces; end it without an alarm. Its noise model is that of the innovation up to the alarm."""
     if not (detected and layout.general and memory.estimator.found.size > 1):
         memory.estimator.active = 0
     elif not memory.estimator.active:
@@ -279,8 +295,8 @@ def observe(law, output, main, x, design, moments, G):
 
 @kernel
 def demand(control, prediction, measured):
-    """Bring gains, observer and estimator to this frame; fill the law's demand G u_c, hold and disturbance d
-    of the axes, (3,) rad/s2:
+    """Bring gains, observer and estimator to this frame, in this order: each needs the one before. Fill the
+    law's demand G u_c, hold and disturbance d of the axes, (3,) rad/s2:
 
         demand = xm' + Kp (xm - x+) - f - d,    hold = -f - d
 
@@ -321,23 +337,27 @@ def look_ahead(law, output, i, f, G, u):
 
 @kernel
 def targets(reference, i, share):
-    """xm of axis i, rad/s, when the command acts, a `share` of a frame from now, and a frame later. Between
-    two frames xm is taken as linear."""
+    """xm of axis i, rad/s, at the instant from which the command acts, a `share` of a frame from now, and a
+    frame later; xm_k: k frames from now, linear in between:
+
+    xm_0 + share (xm_1 - xm_0),    xm_1 + share (xm_2 - xm_1)
+    """
     config, output = reference.config, reference.output
-    rate, acceleration = output.governed_rate[i], output.governed_acceleration[i]
+    xm_0, acceleration = output.governed_rate[i], output.governed_acceleration[i]
     wanted = reference.memory.scale[i] * output.commanded_rate[i]
-    following, acceleration = advance(config, rate, acceleration, wanted)
-    last, _ = advance(config, following, acceleration, wanted)
-    return rate + share * (following - rate), following + share * (last - following)
+    xm_1, acceleration = advance(config, xm_0, acceleration, wanted)
+    xm_2, _ = advance(config, xm_1, acceleration, wanted)
+    return xm_0 + share * (xm_1 - xm_0), xm_1 + share * (xm_2 - xm_1)
 
 
 def unexplained(control: np.void) -> np.ndarray:
-    """What the law attributes to no model, (3,) rad/s2 (control.CompiledLaw)."""
+    """The acceleration that the law attributes to no model, d (3,) rad/s2 (control.CompiledLaw)."""
     return np.array(control["rejecting"]["observer"]["disturbance"])
 
 
 def begin(control: np.void, before: np.void, unexplained: np.ndarray, learnt: np.ndarray) -> None:
-    """Take over in flight (control.CompiledLaw): the observer goes on, or begins with what is measured."""
+    """Take over in flight (control.CompiledLaw): the observer of the law before goes on, with d =
+    unexplained; if that law had none, it begins with the measured rates (`observe`)."""
     control["rejecting"]["observer"] = before["rejecting"]["observer"]
     control["rejecting"]["observer"]["disturbance"] = unexplained
 

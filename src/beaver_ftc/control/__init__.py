@@ -17,15 +17,15 @@ if TYPE_CHECKING:
     from beaver_ftc.design.context import Context
 
 _ROWS = compiled_rows(LAWS)
-# The modules of kernels: a law's place is that of its module
+# The modules of kernels. The place of a law is that of its module in this order.
 MODULES = tuple(dict.fromkeys(row["kernels"] for row in _ROWS.values()))
-# What plugins.yaml need not say of a law
+# Defaults of the keys that plugins.yaml may omit for a law
 _GIVEN = {"uses_verdict": False, "reallocates": False, "informed": False, "pitch_by_power": True}
 
 
 class Row(NamedTuple):
-    """A law by name. place: of its file among those of compiled laws; file: its name without `.py`.
-    uses_verdict, reallocates, informed, pitch_by_power: what the law is given, see plugins.yaml."""
+    """A law by name. place: of its module in MODULES; file: name of its file, without `.py`.
+    uses_verdict, reallocates, informed, pitch_by_power: what the law receives and may do (plugins.yaml)."""
 
     name: str
     place: int
@@ -43,7 +43,8 @@ def file_of(module: str) -> str:
 
 @cache
 def row_of(name: str) -> Row:
-    """The row of a compiled law; of a plug-in the first row, whose law makes no use of the verdict."""
+    """The row of a compiled law; for a plug-in, the values of the first row, whose law does not use the
+    verdict."""
     row = _ROWS.get(name) or next(iter(_ROWS.values()))
     given = {key: bool(row.get(key, default)) for key, default in _GIVEN.items()}
     return Row(name, MODULES.index(row["kernels"]), file_of(row["kernels"]), **given)

@@ -2,8 +2,13 @@
 
     demand = xm' + Kp e + Ki int e - f - fhat,    e = xm - x,    then G u = demand
 
+    x, xm      (3,) rad/s          body rates: measured, of the reference model
+    f, G       rad/s2, rad/s2 per rad   design model
+    fhat       (3,) rad/s2         acceleration that the model does not explain (`surfaces.output.unknown`)
+    Kp, Ki     1/s, 1/s2           gains
+
 The laws nominal, adaptive, fault-tolerant-published and oracle-published are this one. They differ in fhat,
-in the effectiveness in G and in who carries the demand: plugins.yaml says what each is given.
+in the effectiveness in G, and in the surfaces that carry the demand (plugins.yaml).
 """
 
 import numpy as np
@@ -39,7 +44,7 @@ def command(control, assessment, faults, prediction, measured, mode, t):
 
 @kernel
 def command_by(law, fhat, control, assessment, faults, prediction, measured, mode, t):
-    """Command from a record of type FEEDBACK; fhat (3,) rad/s2: what is unknown beside the model."""
+    """The steps of the law in a frame, with a record of type FEEDBACK; zhang2005.py has its own fhat."""
     axes, reference = control.axes, control.reference
     laws.prepare(control, assessment, prediction, mode, t)
     demand(law, axes, reference.output, measured.x, prediction.f, fhat)
@@ -54,8 +59,7 @@ def demand(law, axes, reference, x, f, fhat):
 
         demand = xm' + Kp e + Ki int e - f - fhat,    e = xm - x,    hold = -f - fhat
 
-    x (3,) rad/s; f, fhat (3,) rad/s2: the model's acceleration and what is unknown beside it; reference: the
-    output of laws/reference.py, whose governed rate and acceleration are xm, xm'.
+    reference: the output of laws/reference.py, whose governed rate and acceleration are xm, xm'.
     """
     config = law.config
     for i in range(3):
@@ -67,12 +71,12 @@ def demand(law, axes, reference, x, f, fhat):
 
 @kernel
 def integrate(law, axes, reference, u, x):
-    """Advance the integrators; what the limited surfaces could not give is taken back (anti-windup):
+    """Advance the integrators, less the part of the demand that was not given (anti-windup):
 
         int e <- int e + dt (e + (G u - demand) / Kp)
 
-    u (n,) rad: the command; x (3,) rad/s. The back-calculation gain 1/Kp unwinds within one closed-loop time
-    constant.
+    u (n,) rad: the command. The gain 1/Kp of this back-calculation unwinds the integral within one time
+    constant of the closed loop.
     """
     G, dt = axes.G, reference.config.dt
     for i in range(3):
@@ -84,12 +88,13 @@ def integrate(law, axes, reference, u, x):
 
 
 def unexplained(control: np.void) -> np.ndarray:
-    """What the law attributes to no model, (3,) rad/s2 (control.CompiledLaw)."""
+    """The acceleration that the law attributes to no model, (3,) rad/s2 (control.CompiledLaw)."""
     return unexplained_by(control["published"], control["surfaces"]["output"]["unknown"])
 
 
 def unexplained_by(law: np.void, fhat: np.ndarray) -> np.ndarray:
-    """The same of a record of type FEEDBACK: fhat (3,) rad/s2 and what the integrators stand for."""
+    """The same of a record of type FEEDBACK: fhat - Ki int e, because the integrators stand for a missing
+    fhat."""
     found: np.ndarray = fhat - law["config"]["Ki"] * law["memory"]["integral"]
     return found
 
@@ -97,15 +102,16 @@ def unexplained_by(law: np.void, fhat: np.ndarray) -> np.ndarray:
 def begin(control: np.void, before: np.void, unexplained: np.ndarray, learnt: np.ndarray) -> None:
     """Take over in flight: the integrators begin where the demand is (control.CompiledLaw).
 
-    `learnt` is what the diagnosis' network explains; only a law that uses the verdict and is not informed
-    subtracts it.
+    learnt (3,) rad/s2: the part that the network of the diagnosis explains. Only a law that uses the verdict
+    and is not informed subtracts it, as fhat.
     """
     uses_network = control["config"]["uses_verdict"] and not control["config"]["informed"]
     begin_integrators(control["published"], unexplained, learnt if uses_network else np.zeros(3))
 
 
 def begin_integrators(law: np.void, unexplained: np.ndarray, fhat: np.ndarray) -> None:
-    """Let the integrators of a record of type FEEDBACK stand for what fhat (3,) rad/s2 does not explain."""
+    """Let the integrators of a record of type FEEDBACK stand for the part of `unexplained` that fhat does not
+    explain, both (3,) rad/s2: int e = (fhat - unexplained) / Ki."""
     if law["config"]["Ki"] > 0.0:
         law["memory"]["integral"] = (fhat - unexplained) / law["config"]["Ki"]
 

@@ -22,7 +22,7 @@ from beaver_ftc.scenario.diagnosis import ControlConfig
 MISSED_RAD_S = 0.1  # integral of the shortfall that brings the scale from 1 to 0
 RECOVERY_S = 30.0  # time constant with which the scale returns to 1: several periods of a slow reference
 
-# A (2, 2), B (2,): the model over a frame of dt s; steered: whether outer loops command the rates.
+# A (2, 2), B (2,): the model over a frame of dt s; steered: whether the autopilot commands the rates.
 REFERENCE_CONFIG = record(dt=float, A=(2, 2), B=2, steered=int)
 # active: whether the reference is governed, from the first loss of authority on; scale (3,): factor of the
 # commanded rate, 0 to 1.
@@ -59,15 +59,15 @@ def discretise(wn: float, zeta: float, dt: float) -> tuple[np.ndarray, np.ndarra
 
 
 @kernel
-def advance(config, rate, acceleration, wanted):
-    """Rate xm (rad/s) and acceleration xm' (rad/s2) of the model a frame on, ref = `wanted` (rad/s) held:
+def advance(config, xm, dxm, ref):
+    """Rate xm, rad/s, and acceleration xm' = dxm, rad/s2, of the model one frame later; ref rad/s is held:
 
     (xm, xm') <- A (xm, xm') + B ref
     """
     A, B = config.A, config.B
     return (
-        A[0, 0] * rate + A[0, 1] * acceleration + B[0] * wanted,
-        A[1, 0] * rate + A[1, 1] * acceleration + B[1] * wanted,
+        A[0, 0] * xm + A[0, 1] * dxm + B[0] * ref,
+        A[1, 0] * xm + A[1, 1] * dxm + B[1] * ref,
     )
 
 
@@ -82,16 +82,16 @@ def follow(config, output, commanded):
 
 @kernel
 def govern(reference, commanded, shortfall, authority_lost):
-    """Bring what the law follows, xm and xm' (3,), to the next frame: those of the model, until the reference
-    is governed, then
+    """Bring the reference that the law follows, xm and xm' (3,), to the next frame. It is the answer of the
+    model until the reference is governed, and then
 
         scale <- scale - dt |shortfall| / MISSED_RAD_S
         scale <- max(scale + dt / RECOVERY_S (1 - scale), 0)
         (xm, xm') <- A (xm, xm') + B scale commanded,    xm <- xm - dt shortfall
 
-    The scale stays while outer loops steer, since they ask again for what was missed. commanded (3,) rad/s;
-    shortfall (3,) rad/s2: what was demanded and not given. authority_lost: whether a surface is slow or
-    parked now; from then on the reference is governed.
+    The scale stays while the autopilot steers, since its loops demand again what was missed. commanded (3,)
+    rad/s; shortfall (3,) rad/s2: the part of the demand that was not given. authority_lost: whether a surface
+    is slow or parked now; from then on the reference is governed.
     """
     config, governor, output = reference.config, reference.memory, reference.output
     if authority_lost:

@@ -76,17 +76,17 @@ def configure(law: np.void, control: np.void, prediction: np.void, declared: Dec
     """
     config, layout, design = law["config"], control["layout"], prediction["design"]
     dt, share = 1.0 / declared.rate_hz, 1.0 / declared.substeps
-    points = schedule_points(declared, y)
+    points = schedule_points(declared, y)  # step 1
     G = np.array([control_effectiveness(design, point) for point in points])
     approach = 1.0 - (1.0 - prediction["actuators"]["approach"]) ** declared.substeps
     lead = [lead_of(float(share_of_way)) for share_of_way in approach]
     fill(config, dt=dt, share=share, qdyn=points[:, QDYN], fading=derive_fading(dt), lead=lead)
-    loops = list(enumerate(layout["main"].tolist()))
+    loops = list(enumerate(layout["main"].tolist()))  # step 2
     if layout["stand_in"] >= 0:
         loops.append((PITCH, int(layout["stand_in"])))
     speed_rad_s = allowed_speeds(declared, loops, np.abs(own_damping(design, y)))
     margin = declared.control.gain_margin_db, declared.control.phase_margin_deg
-    for row, (axis, s) in enumerate(loops):
+    for row, (axis, s) in enumerate(loops):  # step 3
         gyro: RateGyro = getattr(declared.instruments, AXES[axis])
         keep = exp(-gyro.bandwidth_rad_s * dt) if gyro.bandwidth_rad_s else 0.0
         loop = Loop(dt, share, float(approach[s]), config["lead"][s], gyro.delay_s, keep)

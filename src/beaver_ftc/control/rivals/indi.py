@@ -2,13 +2,18 @@
 
     u = u0 + G^-1 (nu - xdot0)          [Sieberling2010]
 
-xdot0 is the filtered difference of the measured rates. u0 are the positions of the surfaces that gave it,
-through the same filter [Smeur2016, sec. III]: those that the declared actuators' model gives, not the
-commands. G u0 of the elapsed frame is measured.contribution, so that
+    nu      (3,) rad/s2           demanded acceleration, by proportional-integral feedback
+    xdot0   (3,) rad/s2           filtered difference of the measured rates
+    u0      (n,) rad              positions of the surfaces that caused xdot0, through the same filter
+                                  [Smeur2016, sec. III]
+    G       (3, n) rad/s2 per rad effectiveness
+
+The positions are those of the model of the declared actuators, not the commands. G u0 of the elapsed frame is
+measured.contribution, so that
 
     G u = nu - xdot0 + G u0
 
-Flown by kernels (kernel_law.py).
+Kernels fly it (kernel_law.py).
 """
 
 from collections.abc import Mapping

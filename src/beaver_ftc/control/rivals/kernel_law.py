@@ -1,7 +1,7 @@
-"""What the rival laws share that fly compiled: `step`, by the kernels of laws/compiled_rivals.py.
+"""The base of the rival laws that fly compiled: their `step` calls the kernels of laws/compiled_rivals.py.
 
-A scenario that names such a law flies it in the loop's own kernels. `step` flies an object of the class that
-is given to the loop, or that a plug-in registers by another name.
+If a scenario names such a law, the kernels of the loop fly it, and `step` is not called. `step` serves an
+object of the class that is given to the loop, or that a plug-in registers by another name.
 """
 
 from collections.abc import Mapping
@@ -26,7 +26,7 @@ class KernelLaw:
     fault_tolerant = False
 
     def reset(self, context: Context) -> None:
-        """Before a flight: in trim, nothing missed yet."""
+        """Prepare for a flight, in trim, with integrals of 0; `axes` (3,): surfaces that lead the axes."""
         self.context, self.option = context, rival_options(self.name, self.defaults, context)
         self.law, self.axes = np.zeros(1, rival_dtype(len(context.surfaces)))[0], np.array(context.leading)
         self.compile_into(self.law)

@@ -5,15 +5,20 @@
     G_lead u_lead = nu - f - C sigma - G_others u_trim,      C a first-order low-pass filter
     nu = xm' + Kp e_m + Ki int e_m,    e_m = xm - x
 
-u: all surfaces, of which those that lead roll, pitch and yaw are commanded and the others stay in trim.
-The adaptation is as fast as the frame allows; what reaches the surfaces is limited by C alone.
+    x, xhat, xm     (3,) rad/s     body rates: measured, predicted, of the reference model
+    sigma           (3,) rad/s2    acceleration that the design model f + G u does not explain
+    a; A, Phi       1/s; 1, s      pole of the predictor; its decay and its integral over a frame
+    u               (n,) rad       all surfaces; those that lead roll, pitch and yaw are commanded, the others
+                                   stay in trim
 
-The predictor of a frame, with x[k] measured and f + G u as it was in the frame:
+The adaptation is as fast as the frame allows; only C limits the bandwidth of the compensation.
+
+The predictor of a frame, with the measured x[k], and f + G u of the frame:
 
     e <- A e + Phi sigma + dt (f + G u) - (x[k] - x[k-1])
 
-Departure: the source's map, exact for what is constant over the frame, multiplies the last two terms by
-Phi / dt, which is 1 - a dt / 2 to first order.
+Departure from the source: its map is exact for terms that are constant over the frame, and multiplies the
+last two terms by Phi / dt, which is 1 - a dt / 2 to first order.
 """
 
 from collections.abc import Mapping
@@ -30,7 +35,7 @@ from beaver_ftc.diagnosis.rivals import rival_options
 
 
 class Predictor:
-    """The state predictor and its adaptation; sigma (3,) rad/s2 is what the model does not explain."""
+    """The state predictor and its adaptation."""
 
     def __init__(self, pole_per_s: float, dt_s: float) -> None:
         self._dt, self._decay = dt_s, exp(-pole_per_s * dt_s)
@@ -56,7 +61,7 @@ class L1Adaptive:
     fault_tolerant = False
 
     def reset(self, context: Context) -> None:
-        """Nothing missed and nothing unexplained yet."""
+        """Prepare for a flight: no error, and nothing unexplained yet."""
         self.context, self.option = context, rival_options(self.name, self.defaults, context)
         self.predictor = Predictor(self.option["predictor_per_s"], context.dt_s)
         self.keep = exp(-self.option["bandwidth_per_s"] * context.dt_s)
@@ -64,7 +69,7 @@ class L1Adaptive:
         self.before: np.ndarray | None = None
 
     def step(self, measured: Measured, reference: Reference, verdict: Verdict) -> np.ndarray:
-        """Learn what the elapsed frame did not explain, and demand the rest."""
+        """Adapt sigma to the elapsed frame, and return the command (surfaces,) rad, within the travel."""
         if self.before is not None:
             sigma = self.predictor.step(measured.x - self.before, measured.acceleration)
             self.compensated = self.keep * self.compensated + (1.0 - self.keep) * sigma
@@ -72,15 +77,15 @@ class L1Adaptive:
         context, leading, nu = self.context, list(self.context.leading), self.demand(measured.x, reference)
         G, wanted = context.model.G(measured.y), context.trim_rad.copy()
         wanted[leading] = 0.0
-        rest = nu - context.model.f(measured.x, measured.y) - self.compensated - G @ wanted
-        wanted[leading] = np.linalg.solve(G[:, leading], rest)
+        needed = nu - context.model.f(measured.x, measured.y) - self.compensated - G @ wanted
+        wanted[leading] = np.linalg.solve(G[:, leading], needed)
         command: np.ndarray = np.clip(wanted, *context.travel_rad)
         self.saturated = bool((command != wanted).any())
         return command
 
     def demand(self, x: np.ndarray, reference: Reference) -> np.ndarray:
-        """nu = xm' + Kp e_m + Ki int e_m (3,) rad/s2. The integral of the error stands still while a surface
-        is at its stop."""
+        """nu = xm' + Kp e_m + Ki int e_m (3,) rad/s2. The integral of the error does not change while a
+        surface is at its stop."""
         error, option = reference.rate - x, self.option
         if not self.saturated:
             self.integral = self.integral + self.context.dt_s * error

@@ -2,8 +2,12 @@
 
     minimise sum e' Qe e + i' Qi i + du' R du,    e = xm - x,  i = int e,  du = u - u_trim - u_feedforward
 
-Weights by Bryson's rule: one over the square of what is acceptable. The gains never change: that is the
-point of it. Flown by kernels (kernel_law.py).
+    e    (3,) rad/s      error of the body rates
+    i    (3,) rad        its integral
+    du   (3,) rad        surfaces that lead roll, pitch and yaw
+
+Weights by Bryson's rule: one over the square of an acceptable value (the options). The gains never change,
+which makes this law a reference for the others. Kernels fly it (kernel_law.py).
 """
 
 from collections.abc import Mapping
@@ -15,7 +19,7 @@ from beaver_ftc.compiled import fill
 from beaver_ftc.control.rivals.kernel_law import KernelLaw
 from beaver_ftc.design.context import Context
 
-_STEP = 1e-6
+_STEP = 1e-6  # rad/s, of a central difference; f is quadratic in x, so it is exact to rounding
 
 
 def gains(A: np.ndarray, B: np.ndarray, Q: np.ndarray, R: np.ndarray) -> np.ndarray:
@@ -36,7 +40,7 @@ class FixedGainLqr(KernelLaw):
     defaults: ClassVar[Mapping[str, float]] = {"error_deg_s": 0.5, "integral_deg": 0.5, "deflection_deg": 3.0}
 
     def compile_into(self, law: np.void) -> None:
-        """Linearise about the trim and solve for the gains, once, of z = (x - xm, int x - xm):
+        """Fill gains and linear model, by linearisation about the trim. The state z = (x - xm, int x - xm):
 
         z[k+1] = ((I + dt A) z_1 + dt B du, z_2 + dt z_1)
         """
@@ -52,7 +56,8 @@ class FixedGainLqr(KernelLaw):
 
 
 def linearised(context: Context) -> tuple[np.ndarray, np.ndarray]:
-    """A (3, 3) 1/s and B (3, 3) rad/s2 per rad of the design model about the trim, air data held."""
+    """A (3, 3) 1/s and B (3, 3) rad/s2 per rad of the design model about the trim, with the air data
+    constant; the columns of B are the surfaces that lead the axes."""
     model, x, y = context.model, context.trim_x, context.trim_y
     steps = np.eye(3) * _STEP
     A = np.column_stack([(model.f(x + s, y) - model.f(x - s, y)) / (2.0 * _STEP) for s in steps])

@@ -58,13 +58,6 @@ def mean_with_offset(srf, b, u_end):
     return clip_travel(srf, u_end + b) if stops else srf.last.u + b
 
 
-@kernel
-def deflection_error(srf, h):
-    """b in the middle of its set, rad; infinite while an end of the set is open."""
-    lo, hi = srf.sets.low[h], srf.sets.high[h]
-    return set_middle(srf, h) if hi - lo < np.inf else np.inf
-
-
 def estimate_interval(fdi: np.void, s: int, h: int) -> tuple[float, float] | None:
     """The interval of b, rad; None while one end is open."""
     lo, hi = feasible_set(fdi, s, h)
@@ -75,7 +68,8 @@ TYPES = (
     FaultType(
         name="bias", has_constant_parameter=True, sort_rank=6,
         consistent_interval=consistent_interval, deflection_range=deflection_range,
-        accommodation_mode=SUBTRACT_OFFSET, deflection_error=deflection_error, deflection_error_precedence=2,
+        # the middle of the set is not finite, so not known, while an end of the set is open
+        accommodation_mode=SUBTRACT_OFFSET, deflection_error=set_middle, deflection_error_precedence=2,
         deflection_relation=DeflectionRelation(
             1.0, theta_is_share=False, theta_span=lambda low, high: (low - high, high - low)
         ),

@@ -94,9 +94,7 @@ def consistent_interval(c, srf, h, k):
 def motion_rules_out(srf, h, stop):
     """Whether the surface has moved towards that stop (1 upper, -1 lower, 0 none) as fast as only a runaway
     does."""
-    if stop == 0:
-        return False
-    return srf.growing_bias.has_run[1 if stop == 1 else 0] == 1
+    return stop != 0 and srf.growing_bias.has_run[1 if stop == 1 else 0] == 1
 
 
 def estimate_parameter(fdi: np.void, s: int, h: int) -> float:

@@ -109,7 +109,7 @@ AUTOPILOT = record(
     engines_alone_yaw_share=float,  # share of the last BY_POWER_S in which engines alone act in yaw
     # Output
     rates=3,  # p, q, r to fly, rad/s
-    gain=GAIN,
+    gain=GAIN,  # configuration: GAINS, by autopilot_setup.py
     sets_power=int, power_setting=float,  # whether the autopilot sets the engine now, and to what
     power_airspeed=float,  # m/s, to hold while power stands in for a lost pitch
     airspeed_to_fly=float, airspeed_to_fly_rate=float,  # m/s; its rate of change, m/s2

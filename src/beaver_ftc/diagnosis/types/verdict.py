@@ -1,5 +1,5 @@
-"""Which type of fault is on which surface: from the types left to the finding. modes.py then chooses what the
-law does, and findings.py puts the finding in words.
+"""Which type of fault is on which surface: from the remaining types to the finding. modes.py then chooses
+what the law does, and findings.py puts the finding in words.
 
 No type is named here: the columns of the table (`FaultType`) say what distinguishes one from another. Kernels
 of one surface assume that it is at fault; `can_be_faulty` says whether it can be.

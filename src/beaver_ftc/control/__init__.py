@@ -46,8 +46,8 @@ def row_of(name: str) -> Row:
     """The row of a compiled law; for a plug-in, the values of the first row, whose law does not use the
     verdict."""
     row = _ROWS.get(name) or next(iter(_ROWS.values()))
-    given = {key: bool(row.get(key, default)) for key, default in _GIVEN.items()}
-    return Row(name, MODULES.index(row["kernels"]), file_of(row["kernels"]), **given)
+    flags = {key: bool(row.get(key, default)) for key, default in _GIVEN.items()}
+    return Row(name, MODULES.index(row["kernels"]), file_of(row["kernels"]), **flags)
 
 
 def has_kernels(name: str) -> bool:

@@ -224,14 +224,14 @@ def pitch(axes, output, layout, effectiveness, share, probe):
     G_e, G_f: of pitch, rad/s2 per rad, with the effectiveness of each surface in it; effectiveness: of the
     elevator; probe: rad of the flap.
     """
-    G, u, needed = axes.G, output.command, axes.demand[PITCH]
+    G, u, demand = axes.G, output.command, axes.demand[PITCH]
     e, f = layout.main[PITCH], layout.stand_in
     if f >= 0:
         hold = divide(G[PITCH, e], effectiveness) * layout.trim[e]
-        flap = layout.trim[f] + share * (divide(needed - hold, G[PITCH, f]) - layout.trim[f])
+        flap = layout.trim[f] + share * (divide(demand - hold, G[PITCH, f]) - layout.trim[f])
         u[f] = clip(output, layout, f, flap + probe)
-        needed -= G[PITCH, f] * u[f]
-    u[e] = clip(output, layout, e, divide(needed, G[PITCH, e]))
+        demand -= G[PITCH, f] * u[f]
+    u[e] = clip(output, layout, e, divide(demand, G[PITCH, e]))
 
 
 @kernel
@@ -279,8 +279,8 @@ def set_problem(problem, G, layout, effectiveness, prediction, share, probe):
             problem.weight[s] *= min(max(ratio, RELUCTANT), 1.0 / RELUCTANT)
     if probe != 0.0 and layout.stand_in >= 0:
         f = layout.stand_in
-        held = min(max(layout.trim[f] + probe, problem.low[f]), problem.high[f])
-        problem.u_preferred[f] = problem.low[f] = problem.high[f] = held
+        u_probe = min(max(layout.trim[f] + probe, problem.low[f]), problem.high[f])
+        problem.u_preferred[f] = problem.low[f] = problem.high[f] = u_probe
 
 
 @apart
@@ -359,10 +359,10 @@ def hand_over_pitch(allocation, reallocated, at_once, remains, least):
             output.hand_over = max(output.hand_over, 1.0 - remains)
     else:
         output.hand_over = max(output.hand_over - config.hand_over_step, 0.0)
-    given = output.hand_over if remains > 0.0 else 1.0
+    progress = output.hand_over if remains > 0.0 else 1.0
     if reallocated or remains <= 0.0:
         output.lost_share = 1.0 - remains if remains >= least else 1.0
-    output.transfer_share = smoothstep(given) * output.lost_share
+    output.transfer_share = smoothstep(progress) * output.lost_share
 
 
 @kernel
@@ -391,10 +391,10 @@ def note_shortfall(axes, command, layout, lag, engine_authority):
     """
     G = axes.G
     for i in range(3):
-        given = 0.0
+        acceleration = 0.0
         for s in range(command.size):
-            given += G[i, s] * (command[s] + lag[s])
-        axes.shortfall[i] = axes.demand[i] - given
+            acceleration += G[i, s] * (command[s] + lag[s])
+        axes.shortfall[i] = axes.demand[i] - acceleration
         least, greatest = attainable(G, layout, engine_authority, i)
         axes.beyond[i] = not least <= axes.hold[i] <= greatest
 

@@ -269,18 +269,18 @@ def change_allowed_power(autopilot, power, at_stop, y):
 
 
 @kernel
-def highest_power(autopilot, power, left, y):
-    """The highest setting with the remaining effectiveness `left` of the rudder: the propeller of the Beaver
+def highest_power(autopilot, power, E, y):
+    """The highest setting with the remaining effectiveness `E` of the rudder: the propeller of the Beaver
     yaws the aircraft with dpt^3, and what the rudder lacks, sideslip makes up for.
 
-        dpt^3 held = left highest_dpt^3 + (1 - left) dpt_cubed_held_by_sideslip
+        dpt^3 held = E highest_dpt^3 + (1 - E) dpt_cubed_held_by_sideslip
 
     The slower the flight, the lower is this power. A climb with more power would end in slow flight.
     """
-    if left >= 1.0:
+    if E >= 1.0:
         return autopilot.allowed_power
-    held = max(left, 0.0) * power.config.highest_dpt**3 + (1.0 - left) * autopilot.dpt_cubed_held_by_sideslip
-    return min(autopilot.allowed_power, ceiling(power, y, held ** (1.0 / 3.0)))
+    dpt3_held = max(E, 0.0) * power.config.highest_dpt**3 + (1.0 - E) * autopilot.dpt_cubed_held_by_sideslip
+    return min(autopilot.allowed_power, ceiling(power, y, dpt3_held ** (1.0 / 3.0)))
 
 
 @kernel
@@ -298,10 +298,10 @@ def path_angle_to_fly(autopilot, measured, push):
     V, gain, M = autopilot.airspeed, autopilot.gain, autopilot.missing_path_angle
     error = autopilot.command[ALTITUDE] - measured.altitude
     climb_mps = autopilot.command_rate[ALTITUDE] + gain.altitude * error
-    wanted = climb_mps / V + M
+    demand = climb_mps / V + M
     low, high = path_angle_limits(autopilot, push)
-    path = min(max(wanted, low), high)
-    if path == wanted:
+    path = min(max(demand, low), high)
+    if path == demand:
         autopilot.missing_path_angle = clamp(M + autopilot.dt * gain.altitude_i * error / V, MOST_MISSING)
     return path
 
@@ -314,9 +314,9 @@ def glide_path_angle(autopilot):
     """
     error = autopilot.airspeed_to_fly - autopilot.airspeed
     along = autopilot.airspeed_to_fly_rate + autopilot.missing_acceleration + autopilot.gain.speed * error
-    steeper = along / autopilot.gravity
-    limited = clamp(steeper, MOST_PATH_RAD)
-    if limited == steeper:
+    demand = along / autopilot.gravity
+    limited = clamp(demand, MOST_PATH_RAD)
+    if limited == demand:
         integrate_missing_acceleration(autopilot, error)
     return autopilot.climb_in_trim - limited
 
@@ -364,8 +364,8 @@ def pitch_attitude_rate(autopilot, y, attitude, path):
     glides = autopilot.pitch_holds_airspeed and autopilot.is_commanded[SPEED]
     if not (autopilot.is_commanded[ALTITUDE] or glides):
         return 0.0
-    wanted = path + autopilot.alpha * np.cos(attitude[ROLL]) - attitude[PITCH]
-    rate = clamp(autopilot.gain.attitude * wanted, autopilot.rate_limit[PITCH])
+    demand = path + autopilot.alpha * np.cos(attitude[ROLL]) - attitude[PITCH]
+    rate = clamp(autopilot.gain.attitude * demand, autopilot.rate_limit[PITCH])
     return min(rate, autopilot.gain.protection * (autopilot.steepest_alpha - y[ALPHA]))
 
 
@@ -387,9 +387,9 @@ def bank_angle_rate(autopilot, attitude):
     else:
         return 0.0
     error = clamp(bank, autopilot.bank_limit) - attitude[ROLL]
-    wanted = share * gain.bank * error + roll_loss * autopilot.missing_roll_rate
-    rate = clamp(wanted, autopilot.rate_limit[ROLL])
-    if rate == wanted:
+    demand = share * gain.bank * error + roll_loss * autopilot.missing_roll_rate
+    rate = clamp(demand, autopilot.rate_limit[ROLL])
+    if rate == demand:
         autopilot.missing_roll_rate += roll_loss * autopilot.dt * share * gain.bank_i * error
     return rate
 
@@ -464,10 +464,10 @@ def set_power(autopilot, power, y, path, push):
     else:
         along += autopilot.gain.speed * error
     climbing = autopilot.gravity * (path - autopilot.climb_in_trim)
-    wanted = power_for(autopilot.engine, push, autopilot.trim_power, along + climbing)
+    demand = power_for(autopilot.engine, push, autopilot.trim_power, along + climbing)
     high = min(autopilot.full_power, ceiling(power, y, power.config.highest_dpt))
     room = KEPT_ASIDE * autopilot.engines_alone_yaw_share * (autopilot.high_power - autopilot.low_power)
-    limited = max(min(wanted, high - room), autopilot.low_power + room)
-    if limited == wanted:
+    limited = max(min(demand, high - room), autopilot.low_power + room)
+    if limited == demand:
         integrate_missing_acceleration(autopilot, error)
     autopilot.power_setting = limited

@@ -111,8 +111,8 @@ def limit(config, memory, authority, base):
     """Fill the limits of u_k, m/s2, around the setting `base` of the common lever, and `authority` (2, 3)
     rad/s2:
 
-        |u_k| <= most = min(gain up to config.high, loss down to config.low)
-        authority_i = -+ sum_k |B_ik| most
+        |u_k| <= u_max = min(gain up to config.high, loss down to config.low)
+        authority_i = -+ sum_k |B_ik| u_max
 
     The limits up and down are equal. To yaw, two engines on opposite sides then give opposite u, also at
     their limits, and the sum of the thrust, which holds the airspeed, stays.
@@ -120,11 +120,11 @@ def limit(config, memory, authority, base):
     problem, table = memory.problem, memory.thrust
     authority[:] = 0.0
     # 0.0 is the push (thrust.py), which is not used: an aircraft with such engines has a table
-    most = min(gained(table, 0.0, base, config.high), -gained(table, 0.0, base, config.low))
+    u_max = min(gained(table, 0.0, base, config.high), -gained(table, 0.0, base, config.low))
     for k in range(config.n):
-        problem.low[k], problem.high[k] = -most, most
+        problem.low[k], problem.high[k] = -u_max, u_max
         for i in (PITCH, YAW):
-            reach = abs(config.B[i, k] * most)
+            reach = abs(config.B[i, k] * u_max)
             authority[0, i] -= reach
             authority[1, i] += reach
 

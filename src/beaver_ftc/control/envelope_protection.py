@@ -164,11 +164,11 @@ def approach_airspeed_to_fly(autopilot):
     """Move the airspeed to fly towards the nearest to the command that can be held, at most at
     max_airspeed_rate_mps2, so without a bump. Without a limit, it is the command."""
     hold, command = autopilot.holding, autopilot.command[SPEED]
-    wanted = min(max(command, hold.slowest), hold.fastest)
-    if wanted == command and not hold.limits_airspeed:
+    target = min(max(command, hold.slowest), hold.fastest)
+    if target == command and not hold.limits_airspeed:
         autopilot.airspeed_to_fly, autopilot.airspeed_to_fly_rate = command, autopilot.command_rate[SPEED]
         return
-    step = clamp(wanted - autopilot.airspeed_to_fly, hold.max_airspeed_rate_mps2 * autopilot.dt)
+    step = clamp(target - autopilot.airspeed_to_fly, hold.max_airspeed_rate_mps2 * autopilot.dt)
     autopilot.airspeed_to_fly += step
     autopilot.airspeed_to_fly_rate = step / autopilot.dt
     hold.limits_airspeed = autopilot.airspeed_to_fly != command
@@ -210,9 +210,9 @@ def set_up_level_flight_table(holding: np.void, layout: np.void, declared: Decla
     flap_rad = np.linspace(layout["low"][flap], layout["high"][flap], N_FLAP)
     surfaces = aircraft.surfaces[layout["main"][PITCH]], aircraft.surfaces[flap]
     mass_kg, scale = declared.mass.mass_kg, tuple(declared.scale.items())
-    needed = elevator_needed(aircraft, surfaces, mass_kg, scale, tuple(qdyn_pa), tuple(flap_rad))
+    elevator = elevator_needed(aircraft, surfaces, mass_kg, scale, tuple(qdyn_pa), tuple(flap_rad))
     fill(
-        holding, qdyn=qdyn_pa, flap=flap_rad, has_table=np.isfinite(needed).all(), elevator=needed,
+        holding, qdyn=qdyn_pa, flap=flap_rad, has_table=np.isfinite(elevator).all(), elevator=elevator,
         max_airspeed_rate_mps2=MAX_AIRSPEED_RATE_MPS2, flap_reserve=radians(FLAP_RESERVE_DEG),
     )  # fmt: skip
 

@@ -74,8 +74,8 @@ def is_at_hand(declared: Declared) -> bool:
     the law is informed, or it reallocates, may pitch by power, and receives the diagnosis of all types."""
     law = row_of(declared.control.law)
     diagnoses_all_types = declared.fdi.fault_class == "all" and law.pitch_by_power
-    wanted = declared.control.power.enabled and (law.informed or (law.reallocates and diagnoses_all_types))
-    return wanted and _has_piston_engine(declared.aircraft)
+    may_use = declared.control.power.enabled and (law.informed or (law.reallocates and diagnoses_all_types))
+    return may_use and _has_piston_engine(declared.aircraft)
 
 
 def _has_piston_engine(aircraft: Aircraft) -> bool:
@@ -151,12 +151,12 @@ def pitch_is_lost(layout, surfaces, saturated, shortfall):
     """
     effectiveness, elevator = surfaces.output.effectiveness, layout.main[PITCH]
     least = surfaces.config.least_effectiveness
-    most = remaining(layout, effectiveness, PITCH)
+    remains = remaining(layout, effectiveness, PITCH)
     for s in range(effectiveness.size):
         if layout.is_backup[s]:
-            most = max(most, effectiveness[s])
+            remains = max(remains, effectiveness[s])
     unable = effectiveness[elevator] < least or saturated[elevator] == 1
-    return most < least or (unable and abs(shortfall[PITCH]) > LEAST_LACK_RAD_S2)
+    return remains < least or (unable and abs(shortfall[PITCH]) > LEAST_LACK_RAD_S2)
 
 
 @kernel

@@ -28,9 +28,9 @@ SETTLED_S = 30.0  # time after a change of the command of an angle before its de
 
 
 @kernel
-def clamp(value, most):
-    """The value, limited to -most and most."""
-    return min(max(value, -most), most)
+def clamp(value, limit):
+    """The value, limited to -limit and limit."""
+    return min(max(value, -limit), limit)
 
 
 @kernel
@@ -40,15 +40,15 @@ def wrap_to_half_turn(angle):
 
 
 @kernel
-def begin_leg(autopilot, c, now, t):
-    """Begin the next leg of channel c at t s; now: its measured value, from which the command begins with the
-    first leg. A heading goes to the value by the shorter turn. A leg without a value (NaN) keeps the
+def begin_leg(autopilot, c, measured, t):
+    """Begin the next leg of channel c at t s; measured: the signal, from which the command begins
+    with the first leg. A heading goes to the value by the shorter turn. A leg without a value (NaN) keeps the
     command."""
     j = autopilot.next_leg_index[c]
     autopilot.next_leg_index[c] = j + 1
     if not autopilot.is_commanded[c]:
         autopilot.is_commanded[c] = 1
-        autopilot.command[c] = now
+        autopilot.command[c] = measured
     value = autopilot.leg_value[c, j]
     autopilot.goal[c] = autopilot.command[c]
     if not np.isnan(value):
@@ -122,5 +122,5 @@ def set_up_profile(autopilot: np.void, declared: Declared) -> None:
         for j, leg in enumerate(legs):
             autopilot["leg_starts_at_s"][c, j] = leg.at_s
             autopilot["leg_value"][c, j] = nan if leg.value is None else leg.value * unit
-            most = getattr(leg, "climb_mps", getattr(leg, "change_mps2", inf))
-            autopilot["leg_max_command_rate"][c, j] = most
+            rate = getattr(leg, "climb_mps", getattr(leg, "change_mps2", inf))
+            autopilot["leg_max_command_rate"][c, j] = rate

@@ -91,5 +91,5 @@ def power_for(engine, push, trim, acceleration):
     the table."""
     if engine.settings == 0:
         return trim + acceleration / push
-    wanted = acceleration + between(trim, engine.settings, engine.setting, engine.now)
-    return between(wanted, engine.settings, engine.now, engine.setting)
+    total = acceleration + between(trim, engine.settings, engine.setting, engine.now)
+    return between(total, engine.settings, engine.now, engine.setting)

@@ -26,10 +26,10 @@ def actuators_dtype(n: int) -> np.dtype:
 
 
 @kernel
-def nearer(u, wanted, approach, step):
-    """Where a surface at u rad is one JSBSim frame later, rad. It rises with u and never passes `wanted`, so
+def nearer(u, target, approach, step):
+    """Where a surface at u rad is one JSBSim frame later, rad. It rises with u and never passes `target`, so
     that the ends of an interval of u can be moved one by one."""
-    return u + min(max((wanted - u) * approach, -step), step)
+    return u + min(max((target - u) * approach, -step), step)
 
 
 @kernel
@@ -40,9 +40,9 @@ def farthest(u, command, sign, approaches, steps, band, low, high):
     it can, away from it as slowly as it can. Its target is `band` beyond the command on that side, within the
     stops.
     """
-    wanted = min(max(command + sign * band, low), high)
-    fast = 1 if sign * (wanted - u) > 0.0 else 0
-    return nearer(u, wanted, approaches[fast], steps[fast])
+    target = min(max(command + sign * band, low), high)
+    fast = 1 if sign * (target - u) > 0.0 else 0
+    return nearer(u, target, approaches[fast], steps[fast])
 
 
 @kernel
@@ -52,8 +52,8 @@ def move(actuators, command, u):
         u[:] = command
         return
     for s in range(u.size):
-        wanted = min(max(command[s], actuators.low[s]), actuators.high[s])
-        reached = nearer(u[s], wanted, actuators.approach[s], actuators.step[s])
+        target = min(max(command[s], actuators.low[s]), actuators.high[s])
+        reached = nearer(u[s], target, actuators.approach[s], actuators.step[s])
         u[s] = min(max(reached, actuators.low[s]), actuators.high[s])
 
 

@@ -1,6 +1,6 @@
 """The conclusion about the surfaces, and the assessment of each surface that the laws read.
 
-*Conclusion* (`found`): the alarm, surface and type of the fault, and the surface on which the law acts. The
+*Conclusion*: the alarm, surface and type of the fault, and the surface on which the law acts. The
 stages of the diagnosis return their findings, and the schemes (schemes/) hand each of them to a kernel of
 this file, which alone writes the conclusion:
 
@@ -73,80 +73,90 @@ def conclusion_dtype(n: int) -> np.dtype:
     )  # fmt: skip
 
 
-def reset_conclusion(found: np.void) -> None:
+def reset_conclusion(conclusion: np.void) -> None:
     """Fill the conclusion of a diagnosis that has found nothing yet."""
     fill(
-        found, detected_at_s=-1.0, isolated_estimator=NOT_ISOLATED, isolated_at_s=-1.0, fault_type=-1,
+        conclusion, detected_at_s=-1.0, isolated_estimator=NOT_ISOLATED, isolated_at_s=-1.0, fault_type=-1,
         typed_at_s=-1.0, target=-1, accommodation_mode=-1, from_s=-1.0, isolated_type=-1, type_from_s=-1.0,
     )  # fmt: skip
 
 
 @kernel
-def latch_alarm(found, axis, t):
+def latch_alarm(conclusion, axis, t):
     """Latch an alarm at t s on an axis. Only the first alarm is recorded."""
-    if not found.detected:
-        found.detected, found.detected_at_s, found.axis = 1, t, axis
+    if not conclusion.detected:
+        conclusion.detected, conclusion.detected_at_s, conclusion.axis = 1, t, axis
 
 
 @kernel
-def set_isolated(found, j, t):
+def set_isolated(conclusion, j, t):
     """Replace the isolated fault by that of estimator j, or by NOT_ISOLATED or UNANTICIPATED; if this is a
     change, the time of isolation becomes t s."""
-    if j != found.isolated_estimator:
-        found.isolated_estimator, found.isolated_at_s = j, t
+    if j != conclusion.isolated_estimator:
+        conclusion.isolated_estimator, conclusion.isolated_at_s = j, t
 
 
 @kernel
-def record_decision(found, finding, lead):
+def record_decision(conclusion, finding, lead):
     """Replace isolated fault, type and accommodation by those that the fault types found.
 
     finding: (isolated, isolated_at_s, type, type_at_s); lead: (target, accommodation_mode).
     """
-    found.isolated_estimator, found.isolated_at_s, found.fault_type, found.typed_at_s = finding
-    found.target, found.accommodation_mode = lead
+    conclusion.isolated_estimator, conclusion.isolated_at_s, conclusion.fault_type, conclusion.typed_at_s = (
+        finding
+    )
+    conclusion.target, conclusion.accommodation_mode = lead
 
 
 @kernel
-def record_plugin_verdict(found, plugin, t):
+def record_plugin_verdict(conclusion, plugin, t):
     """Replace the built-in conclusion at t s by the verdict of a plug-in."""
     if plugin.detected:
-        latch_alarm(found, plugin.axis, t)
-    set_isolated(found, plugin.isolated if found.detected else NOT_ISOLATED, t)
-    found.has_effectiveness = plugin.has_effectiveness
-    found.effectiveness[:] = plugin.effectiveness
+        latch_alarm(conclusion, plugin.axis, t)
+    set_isolated(conclusion, plugin.isolated if conclusion.detected else NOT_ISOLATED, t)
+    conclusion.has_effectiveness = plugin.has_effectiveness
+    conclusion.effectiveness[:] = plugin.effectiveness
 
 
 @kernel
-def withdraw_conclusion(found):
+def withdraw_conclusion(conclusion):
     """Withdraw alarm, isolation and type, because a sensor is broken and no surface.
 
     Times of isolation of single surfaces stay: `update_interval` ends them and stores what is withdrawn. The
     axis and the time of the type count only with an alarm and a type, and has_effectiveness is a plug-in's,
     which has no sensor monitor.
     """
-    found.detected, found.isolated_estimator, found.fault_type = 0, NOT_ISOLATED, -1
-    found.detected_at_s = found.isolated_at_s = -1.0
-    found.target = found.accommodation_mode = -1
+    conclusion.detected, conclusion.isolated_estimator, conclusion.fault_type = 0, NOT_ISOLATED, -1
+    conclusion.detected_at_s = conclusion.isolated_at_s = -1.0
+    conclusion.target = conclusion.accommodation_mode = -1
 
 
 @kernel
-def update_interval(found, s, isolated, t, kind, reason):
+def update_interval(conclusion, s, isolated, t, kind, reason):
     """Record at t s whether surface s is isolated, and its type `kind` (-1 if open). If the isolation ends
     with this frame, store it with the reason; if it continues and its type ends, store the type.
     """
-    isolated_since, old_type = found.from_s[s], found.isolated_type[s]
+    isolated_since, old_type = conclusion.from_s[s], conclusion.isolated_type[s]
     if isolated and isolated_since < 0.0:
-        found.from_s[s] = t
+        conclusion.from_s[s] = t
     elif isolated_since >= 0.0 and not isolated:
-        found.n_gone = store_withdrawn(found.gone, found.n_gone, s, old_type, isolated_since, t, reason)
-        found.from_s[s] = -1.0
+        conclusion.n_gone = store_withdrawn(
+            conclusion.gone, conclusion.n_gone, s, old_type, isolated_since, t, reason
+        )
+        conclusion.from_s[s] = -1.0
     elif old_type >= 0 and kind != old_type:
-        found.n_gone_types = store_withdrawn(
-            found.withdrawn_types, found.n_gone_types, s, old_type, found.type_from_s[s], t, reason
+        conclusion.n_gone_types = store_withdrawn(
+            conclusion.withdrawn_types,
+            conclusion.n_gone_types,
+            s,
+            old_type,
+            conclusion.type_from_s[s],
+            t,
+            reason,
         )
     kind = kind if isolated else -1
     if kind != old_type:
-        found.isolated_type[s], found.type_from_s[s] = kind, t
+        conclusion.isolated_type[s], conclusion.type_from_s[s] = kind, t
 
 
 @kernel
@@ -160,9 +170,9 @@ def store_withdrawn(store, n, s, kind, from_s, to_s, reason):
 
 
 @kernel
-def isolated_surface(found, fies):
+def isolated_surface(conclusion, fies):
     """The surface of the isolated fault, or -1."""
-    return fies[found.isolated_estimator].surface if found.isolated_estimator >= 0 else -1
+    return fies[conclusion.isolated_estimator].surface if conclusion.isolated_estimator >= 0 else -1
 
 
 # 1 / variance of an effectiveness with a standard deviation of 0.05: precise enough to be applied at once
@@ -194,7 +204,7 @@ def assessment_dtype(n: int) -> np.dtype:
 
 
 @kernel
-def assess_surfaces(out, cfg, found, types, layout, fies, stat):
+def assess_surfaces(out, cfg, conclusion, types, layout, fies, stat):
     """Fill the assessment of this frame from the outputs of the stages; stat: of `statistical_dtype`. The
     effectiveness of a surface, and what goes with it, comes from the first source that applies:
 
@@ -205,21 +215,21 @@ def assess_surfaces(out, cfg, found, types, layout, fies, stat):
 
     The law has no target if no surface is isolated or accommodated, and no plug-in estimates effectiveness.
     """
-    all_types, j = cfg.diagnoses_all_types, found.isolated_estimator
-    at_fault = isolated_surface(found, fies)
+    all_types, j = cfg.diagnoses_all_types, conclusion.isolated_estimator
+    at_fault = isolated_surface(conclusion, fies)
     out.held = out.lags = 0
-    out.detected, out.diagnoses_all_types, out.isolated_surface = found.detected, all_types, at_fault
-    out.no_target = j < 0 and found.target < 0 and not found.has_effectiveness
+    out.detected, out.diagnoses_all_types, out.isolated_surface = conclusion.detected, all_types, at_fault
+    out.no_target = j < 0 and conclusion.target < 0 and not conclusion.has_effectiveness
     for s in range(out.accommodation_mode.size):
         out.accommodation_mode[s] = types.surface[s].accommodation.mode if all_types else -1
         out.effectiveness[s], out.at_once[s] = 1.0, 0
         out.offset[s] = out.lag[s] = 0.0
-        if found.has_effectiveness and found.detected:
-            out.effectiveness[s] = found.effectiveness[s]
+        if conclusion.has_effectiveness and conclusion.detected:
+            out.effectiveness[s] = conclusion.effectiveness[s]
         elif out.accommodation_mode[s] >= 0:
             assess_surface(out, types, layout, fies, s)
         elif s == at_fault and not all_types:
-            theta, information = isolated_theta(cfg, found, layout, fies, stat, s)
+            theta, information = isolated_theta(cfg, conclusion, layout, fies, stat, s)
             out.effectiveness[s], out.at_once[s] = 1.0 + theta, information > MIN_INFORMATION
 
 
@@ -260,7 +270,7 @@ def assess_surface(out, types, layout, fies, s):
 
 
 @kernel
-def isolated_theta(cfg, found, layout, fies, stat, s):
+def isolated_theta(cfg, conclusion, layout, fies, stat, s):
     """The estimated theta of the isolated loss of surface s, and its information, 1 / variance.
 
     The statistical detector gives the most likely theta. If its estimates are not used, theta is that of the
@@ -268,7 +278,7 @@ def isolated_theta(cfg, found, layout, fies, stat, s):
     """
     if weighs_statistics(stat, cfg.authority):
         return statistical.estimate_loss(stat.block, s)
-    return fies[found.isolated_estimator].theta[layout.dominant_axis[s]], 0.0
+    return fies[conclusion.isolated_estimator].theta[layout.dominant_axis[s]], 0.0
 
 
 @kernel
@@ -278,19 +288,21 @@ def weighs_statistics(stat, authority):
 
 
 @kernel
-def assess_unknown(out, cfg, found, types, layout, stat, fdae, bound):
+def assess_unknown(out, cfg, conclusion, types, layout, stat, fdae, bound):
     """Fill unknown_acceleration and pitch_undecided; fdae: of `FDAE_RECORD`; bound: what is declared.
 
     The lag of a slow surface gives no unknown acceleration: to compensate it would wind up the command.
     """
     unknown = out.unknown_acceleration
     unknown[:] = 0.0
-    if found.detected and not (found.target >= 0 and found.accommodation_mode == WAIT_FOR_SURFACE):
+    if conclusion.detected and not (
+        conclusion.target >= 0 and conclusion.accommodation_mode == WAIT_FOR_SURFACE
+    ):
         if weighs_statistics(stat, cfg.authority):
             statistical.fill_unmodelled(stat.block, stat.gust, unknown)
         else:
             fdae_unmodelled(fdae, bound.n_gyro, unknown)
     main = types.surface[layout.main[PITCH]]
     waited = main.evidence.n_anomalous >= types.config.half_frames and verdict.can_be_faulty(main)
-    not_isolated = found.detected and found.isolated_estimator == NOT_ISOLATED
+    not_isolated = conclusion.detected and conclusion.isolated_estimator == NOT_ISOLATED
     out.pitch_undecided = cfg.diagnoses_all_types and not_isolated and waited

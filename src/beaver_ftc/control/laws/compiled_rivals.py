@@ -99,14 +99,14 @@ def increment(law, dt, rate, acceleration, main, x, Gu, G, demand, u):
     for i in range(3):
         e = rate[i] - x[i]
         integral = integrate_error(memory, dt, i, e)
-        xdot0, given = memory.rate_filter[1, i], memory.surface_filter[1, i]
+        xdot0, G_u0 = memory.rate_filter[1, i], memory.surface_filter[1, i]
         if memory.begun:
             xdot0 = smooth(memory.rate_filter, i, (x[i] - memory.x_before[i]) / dt, config.keep)
             by_surfaces = 0.0
             for s in main:
                 by_surfaces += Gu[i, s]
-            given = smooth(memory.surface_filter, i, by_surfaces, config.keep)
-        demand[i] = acceleration[i] + config.Kp * e + config.Ki * integral - xdot0 + given
+            G_u0 = smooth(memory.surface_filter, i, by_surfaces, config.keep)
+        demand[i] = acceleration[i] + config.Kp * e + config.Ki * integral - xdot0 + G_u0
     solve(G, main, demand, u)
     for i in range(3):
         demand[i] -= memory.surface_filter[1, i]

@@ -88,17 +88,17 @@ def controller(loop: Loop, s: float, z: np.ndarray) -> np.ndarray:
     """
     dt, share = loop.dt_s, loop.share
     L_rate, L_disturbance = corrections(s, dt)
-    keep, back = 1 - L_rate, 1.0 / z
-    mean = share * back + 1.0 - share
-    one, none = np.ones_like(z), np.zeros_like(z)
+    keep, z_inv = 1 - L_rate, 1.0 / z
+    mean = share * z_inv + 1.0 - share
+    ones, zeros = np.ones_like(z), np.zeros_like(z)
     rows = [
-        [one - keep * back, -keep * dt * back, -keep * dt * mean, none],
-        [L_disturbance * back, one - back + L_disturbance * dt * back, L_disturbance * dt * mean, none],
-        [none, none, one, -actuator_response(loop, z)],
-        [loop.lead * s * one, loop.lead * (1 + s * share * dt) * one,
-         (loop.lead - 1 + loop.lead * s * share * dt) * one, one],
+        [ones - keep * z_inv, -keep * dt * z_inv, -keep * dt * mean, zeros],
+        [L_disturbance * z_inv, ones - z_inv + L_disturbance * dt * z_inv, L_disturbance * dt * mean, zeros],
+        [zeros, zeros, ones, -actuator_response(loop, z)],
+        [loop.lead * s * ones, loop.lead * (1 + s * share * dt) * ones,
+         (loop.lead - 1 + loop.lead * s * share * dt) * ones, ones],
     ]  # fmt: skip
-    driven = np.stack([L_rate * one, L_disturbance * one, none, none], 1)
+    driven = np.stack([L_rate * ones, L_disturbance * ones, zeros, zeros], 1)
     return -np.linalg.solve(np.moveaxis(np.array(rows), 2, 0), driven[..., None])[..., 3, 0]
 
 
@@ -153,8 +153,8 @@ def noise_speed(loop: Loop, s: float, z: np.ndarray, omega: np.ndarray) -> float
     omega (n,) rad/s: up to Nyquist; z = exp(i omega dt).
     """
     speed = (z - 1.0) / loop.dt_s * actuator_response(loop, z)
-    moved = np.abs(speed * controller(loop, s, z) / (1.0 + open_loop(loop, s, z)))
-    return sqrt(float(np.trapezoid(moved**2, omega)) * loop.dt_s / pi)
+    response = np.abs(speed * controller(loop, s, z) / (1.0 + open_loop(loop, s, z)))
+    return sqrt(float(np.trapezoid(response**2, omega)) * loop.dt_s / pi)
 
 
 @lru_cache(maxsize=64)
@@ -167,15 +167,15 @@ def candidates(loop: Loop, gain_db: float, phase_deg: float) -> tuple[np.ndarray
     omega = frequencies(loop.dt_s)
     z = np.exp(1j * omega * loop.dt_s)
     fastest = 0.5 / (loop.dt_s * (0.5 + loop.share) + loop.delay_s)
-    kept: list[float] = []
+    values: list[float] = []
     speeds: list[float] = []
     for s in np.geomspace(LEAST_PER_S, max(fastest, 2.0 * LEAST_PER_S), N_CANDIDATES):
         upper, lower, phase = margins(open_loop(loop, float(s), z))
-        if kept and not (min(upper, lower) >= gain_db + RESERVE_DB and phase >= phase_deg + RESERVE_DEG):
+        if values and not (min(upper, lower) >= gain_db + RESERVE_DB and phase >= phase_deg + RESERVE_DEG):
             break
-        kept.append(float(s))
+        values.append(float(s))
         speeds.append(noise_speed(loop, float(s), z, omega))
-    return np.array(kept), np.array(speeds)
+    return np.array(values), np.array(speeds)
 
 
 def fastest(

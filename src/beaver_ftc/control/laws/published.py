@@ -65,8 +65,8 @@ def demand(law, axes, reference, x, f, fhat):
     for i in range(3):
         error = reference.governed_rate[i] - x[i]
         feedback = config.Kp * error + config.Ki * law.memory.integral[i]
-        wanted = reference.governed_acceleration[i] + feedback - f[i] - fhat[i]
-        set_demand(axes, i, wanted, -f[i] - fhat[i], 0.0)
+        acceleration = reference.governed_acceleration[i] + feedback - f[i] - fhat[i]
+        set_demand(axes, i, acceleration, -f[i] - fhat[i], 0.0)
 
 
 @kernel
@@ -80,11 +80,11 @@ def integrate(law, axes, reference, u, x):
     """
     G, dt = axes.G, reference.config.dt
     for i in range(3):
-        given = 0.0
+        acceleration = 0.0
         for s in range(u.size):
-            given += G[i, s] * u[s]
+            acceleration += G[i, s] * u[s]
         error = reference.output.governed_rate[i] - x[i]
-        law.memory.integral[i] += dt * (error + (given - axes.demand[i]) / law.config.Kp)
+        law.memory.integral[i] += dt * (error + (acceleration - axes.demand[i]) / law.config.Kp)
 
 
 def unexplained(control: np.void) -> np.ndarray:

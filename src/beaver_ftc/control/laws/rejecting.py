@@ -329,10 +329,10 @@ def look_ahead(law, output, i, f, G, u):
 
     f (3,) rad/s2, G (3, n) rad/s2 per rad, u (n,) rad: of this instant; output: that of accommodation.py.
     """
-    now = f[i] + law.observer.disturbance[i]
+    acceleration = f[i] + law.observer.disturbance[i]
     for s in range(u.size):
-        now += G[i, s] * (output.effectiveness[s] * u[s] + output.offset[s])
-    law.memory.ahead[i] = law.observer.rate[i] + law.config.share * law.config.dt * now
+        acceleration += G[i, s] * (output.effectiveness[s] * u[s] + output.offset[s])
+    law.memory.ahead[i] = law.observer.rate[i] + law.config.share * law.config.dt * acceleration
 
 
 @kernel

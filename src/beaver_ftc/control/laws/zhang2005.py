@@ -101,8 +101,8 @@ def adapt(law, surfaces, main, saturated, error, G, u, dt):
         slope = 0.0
         for i in range(3):
             slope += signal[i] * G[i, s] * u[s]
-        moved = surfaces.output.effectiveness[s] + dt * config.gain * slope
-        estimate = min(max(moved, config.least), config.most)
+        updated = surfaces.output.effectiveness[s] + dt * config.gain * slope
+        estimate = min(max(updated, config.least), config.most)
         surfaces.output.target[s] = surfaces.output.effectiveness[s] = estimate
     if config.networks:
         train_state_network(law.network, signal, dt)

@@ -39,5 +39,5 @@ class IncrementalInversion(KernelLaw):
             law["config"], incremental=1, keep=exp(-option["filter_per_s"] * context.dt_s),
             Kp=option["proportional_per_s"], Ki=option["integral_per_s2"],
         )  # fmt: skip
-        given = context.model.G(context.trim_y) * context.trim_rad
-        law["memory"]["surface_filter"] = given[:, list(context.leading)].sum(axis=1)
+        effects = context.model.G(context.trim_y) * context.trim_rad
+        law["memory"]["surface_filter"] = effects[:, list(context.leading)].sum(axis=1)

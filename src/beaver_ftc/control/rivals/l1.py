@@ -42,13 +42,13 @@ class Predictor:
         self._Phi = (1.0 - self._decay) / pole_per_s
         self.error, self.sigma = np.zeros(3), np.zeros(3)
 
-    def step(self, moved: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
-        """e <- A e + dt acceleration + Phi sigma - moved,    sigma = -A / Phi e; returns sigma (3,) rad/s2.
+    def step(self, dx: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
+        """e <- A e + dt acceleration + Phi sigma - dx,    sigma = -A / Phi e; returns sigma (3,) rad/s2.
 
-        moved (3,) rad/s: change of the measured rates over the frame; acceleration (3,) rad/s2: f + G u in
+        dx (3,) rad/s: change of the measured rates over the frame; acceleration (3,) rad/s2: f + G u in
         it.
         """
-        self.error = self._decay * self.error + self._dt * acceleration + self._Phi * self.sigma - moved
+        self.error = self._decay * self.error + self._dt * acceleration + self._Phi * self.sigma - dx
         self.sigma = -self._decay / self._Phi * self.error
         return self.sigma
 

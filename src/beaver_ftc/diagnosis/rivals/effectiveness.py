@@ -130,8 +130,8 @@ class AugmentedUkf(EffectivenessFilter):
         f = self.context.model.f(np.concatenate((points[:, :3], before.x[None])), before.y)
         points = self.move(points, self.transition(measured), measured.acceleration + f[:-1] - f[-1])
         self.z = weights @ points
-        off = points - self.z
-        self.P = self.add_noise((off.T * weights) @ off, measured, self.options["noise"])
+        deviation = points - self.z
+        self.P = self.add_noise((deviation.T * weights) @ deviation, measured, self.options["noise"])
 
     def statistic(self, square: float) -> float:
         """g over the alarm level, with g <- max(0, g + square - N_RATES allowance). N_RATES is the mean of

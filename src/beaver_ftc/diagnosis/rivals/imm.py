@@ -49,8 +49,8 @@ def mix_states(
     predicted = mu @ chain
     weights = chain * mu[:, None] / predicted
     mixed = weights.T @ z
-    off = z[:, None, :] - mixed
-    spread = P[:, None] + off[..., :, None] * off[..., None, :]
+    deviation = z[:, None, :] - mixed
+    spread = P[:, None] + deviation[..., :, None] * deviation[..., None, :]
     return mixed, np.einsum("ij,ijab->jab", weights, spread), predicted
 
 
@@ -107,12 +107,12 @@ class InteractingMultipleModels(KalmanRival):
         modes of one surface together above `isolate`      this surface, with their mean theta
         otherwise                                          candidates: surfaces above 1 - `isolate`
         """
-        least, levels = self.options["isolate"], self.mu[1:-1].reshape(3, N_LEVELS)
-        if self.mu[-1] > least:
+        level, levels = self.options["isolate"], self.mu[1:-1].reshape(3, N_LEVELS)
+        if self.mu[-1] > level:
             return UNANTICIPATED
         lost = levels.sum(axis=1)
         i = int(np.argmax(lost))
-        if lost[i] < least:
-            candidates = tuple(self.context.leaders[j] for j in range(3) if lost[j] > 1.0 - least)
+        if lost[i] < level:
+            candidates = tuple(self.context.leaders[j] for j in range(3) if lost[j] > 1.0 - level)
             return Verdict(True, "pqr"[i], candidates=candidates)
         return self.loss(i, float(levels[i] @ LOSS_THETA_LEVELS / lost[i]))

@@ -102,15 +102,15 @@ def _refuse_pairs(declared: Declared) -> None:
 def record_isolated_surfaces(fdi, t):
     """Record at t s which surfaces are isolated, and of which type: those that the pairs leave, or the one
     surface of the conclusion; none (`void`) once a sensor is found broken."""
-    found, monitor, pairs = fdi.verdict, fdi.sensor_monitor, fdi.types.pair.enabled
+    conclusion, monitor, pairs = fdi.verdict, fdi.sensor_monitor, fdi.types.pair.enabled
     void = sensor_monitor.has_alarm(monitor) and not monitor.output.keeps_surface
-    sole = conclusions.isolated_surface(found, fdi.isolation.estimator)
+    sole = conclusions.isolated_surface(conclusion, fdi.isolation.estimator)
     for s, surf in enumerate(fdi.types.surface):
         isolated = surf.status.is_isolated if pairs else s == sole
-        kind = surf.status.fault_type if pairs else found.fault_type
+        kind = surf.status.fault_type if pairs else conclusion.fault_type
         reason = SENSOR_BROKEN if void else reason_of_withdrawal(fdi, s, isolated)
         conclusions.update_interval(
-            found, s, isolated and not void, t, SAME_NAME[kind] if kind >= 0 else -1, reason
+            conclusion, s, isolated and not void, t, SAME_NAME[kind] if kind >= 0 else -1, reason
         )
 
 

@@ -135,7 +135,7 @@ def isolate(fdi, meas, t, started):
 @apart
 def decide_type(fdi, t, started):
     """Decide on which surface, or two of them, there is a fault, and of which type."""
-    types, found, layout, bank = fdi.types, fdi.verdict, fdi.layout, fdi.bank
+    types, concluded, layout, bank = fdi.types, fdi.verdict, fdi.layout, fdi.bank
     fies, bound = fdi.isolation.estimator, fdi.bound
     verdict.record_exclusions(types.surface, layout, fies)
     if types.pair.enabled:
@@ -145,10 +145,10 @@ def decide_type(fdi, t, started):
     if sensor_monitor.doubts_gyros(fdi.sensor_monitor):
         return
     if types.pair.enabled:
-        finding = pairs.decide_pairs(types, found, layout, t)
+        finding = pairs.decide_pairs(types, concluded, layout, t)
     else:
-        finding = verdict.decide_single(types, found, layout, t)
-    conclusion.record_decision(found, finding, modes.accommodate(types, layout))
+        finding = verdict.decide_single(types, concluded, layout, t)
+    conclusion.record_decision(concluded, finding, modes.accommodate(types, layout))
 
 
 @apart
@@ -264,16 +264,16 @@ def gust_of_views(stat):
 @apart
 def advance_estimators_to_frame(fdi, prediction, measured, k, t):
     """Bring bank, likelihoods, isolation and FDAE to this frame."""
-    found, bound, dt = fdi.verdict, fdi.bound, fdi.config.dt
+    concluded, bound, dt = fdi.verdict, fdi.bound, fdi.config.dt
     update_filters(fdi, prediction, measured)
     if fdi.statistical.test.enabled:
         update_tests(fdi, prediction, measured, k, t)
     update_estimators(fdi, prediction)
     if fdi.config.diagnoses_all_types:
         record_orders(fdi, prediction)
-    leaks = found.isolated_estimator >= 0 or found.target >= 0
+    leaks = concluded.isolated_estimator >= 0 or concluded.target >= 0
     x, F = prediction.x_before, prediction.F_known
-    fdae.advance_fdae(fdi.fdae, fdi.bank, bound, x, F, found.detected, leaks, dt)
+    fdae.advance_fdae(fdi.fdae, fdi.bank, bound, x, F, concluded.detected, leaks, dt)
 
 
 @apart
@@ -292,9 +292,9 @@ def find_alarm_axis(fdi, y, t):
     """The axis on which a detector raises the alarm, or -1. An engine that has failed is outside the class:
     no surface is isolated then. y: measured signals."""
     limit = fdi.bound.error_map.Cn_now
-    found = fdi.verdict
-    if not found.detected and engine_monitor.detect_engine_failure(fdi.engine_monitor, limit, y):
-        conclusion.set_isolated(found, UNANTICIPATED, t)
+    concluded = fdi.verdict
+    if not concluded.detected and engine_monitor.detect_engine_failure(fdi.engine_monitor, limit, y):
+        conclusion.set_isolated(concluded, UNANTICIPATED, t)
         return YAW
     return filters.alarm_axis(fdi.bank, fdi.config.authority, fdi.statistical.alarm)
 

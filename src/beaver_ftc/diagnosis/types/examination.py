@@ -79,23 +79,23 @@ def record_commands(types, commands, ext):
     """
     n = types.config.frames_per_block
     for s, srf in enumerate(types.surface):
-        kept = srf.commands
+        stored = srf.commands
         if types.block.n_so_far == 0:
             for b in range(N_KEPT - 1, 0, -1):
-                kept.history[b, :n] = kept.history[b - 1, :n]
-                for ends in (kept.cmd_min, kept.cmd_max):
+                stored.history[b, :n] = stored.history[b - 1, :n]
+                for ends in (stored.cmd_min, stored.cmd_max):
                     ends[b] = ends[b - 1]
-            for ends in (kept.u_min, kept.u_max):
+            for ends in (stored.u_min, stored.u_max):
                 ends[1] = ends[0]
-            kept.cmd_min[0] = kept.u_min[0] = kept.G_min = np.inf
-            kept.cmd_max[0] = kept.u_max[0] = kept.G_max = -np.inf
+            stored.cmd_min[0] = stored.u_min[0] = stored.G_min = np.inf
+            stored.cmd_max[0] = stored.u_max[0] = stored.G_max = -np.inf
         cmd = clip_travel(srf, commands[s])
-        kept.history[0, types.block.n_so_far] = cmd
-        kept.cmd_min[0], kept.cmd_max[0] = (min(kept.cmd_min[0], cmd), max(kept.cmd_max[0], cmd))
-        kept.u_min[0] = min(kept.u_min[0], ext.u_min[s])
-        kept.u_max[0] = max(kept.u_max[0], ext.u_max[s])
-        kept.G_min = min(kept.G_min, ext.G_min[s])
-        kept.G_max = max(kept.G_max, ext.G_max[s])
+        stored.history[0, types.block.n_so_far] = cmd
+        stored.cmd_min[0], stored.cmd_max[0] = (min(stored.cmd_min[0], cmd), max(stored.cmd_max[0], cmd))
+        stored.u_min[0] = min(stored.u_min[0], ext.u_min[s])
+        stored.u_max[0] = max(stored.u_max[0], ext.u_max[s])
+        stored.G_min = min(stored.G_min, ext.G_min[s])
+        stored.G_max = max(stored.G_max, ext.G_max[s])
 
 
 @kernel
@@ -121,11 +121,11 @@ def count_anomaly(srf):
 @kernel
 def judge_types(c, srf, k):
     """Test every type of one surface with the judged frame, in which something was wrong."""
-    ev, now = srf.evidence, srf.judged
-    if now.lo > now.hi:
+    ev, judged = srf.evidence, srf.judged
+    if judged.lo > judged.hi:
         return
     if ev.k_first < 0:
-        (ev.k_first, ev.first_lo, ev.first_hi) = (k, now.lo, now.hi)
+        (ev.k_first, ev.first_lo, ev.first_hi) = (k, judged.lo, judged.hi)
     for h in range(N_TYPES):
         if HOLDS[h]:
             intersect_set(srf, h, release.held_set(c, srf, h, *deflection_range(h, c, srf, h, k)))
@@ -151,9 +151,9 @@ def judge_frame(types):
     c, k = types.config, types.frame_index - 1
     returns = c.returns_lagged and types.frame_index > 0
     for s, srf in enumerate(types.surface):
-        now = srf.judged
-        rests = c.abrupt and srf.accommodation.mode == GIVE_UP and not now.anomalous
-        judges = now.anomalous and (c.single_instant or (srf.earlier.anomalous and srf.last.anomalous))
+        judged = srf.judged
+        rests = c.abrupt and srf.accommodation.mode == GIVE_UP and not judged.anomalous
+        judges = judged.anomalous and (c.single_instant or (srf.earlier.anomalous and srf.last.anomalous))
         for h in range(N_TYPES):
             see_frame(h, c, srf, h, k, not (rests or judges))
             if returns and HOLDS[h]:
@@ -168,7 +168,7 @@ def judge_frame(types):
         for h in range(N_TYPES):
             if returns and HOLDS[h]:
                 release.advance_returns(c, srf, h)
-        if now.hides[0] or now.hides[1]:
+        if judged.hides[0] or judged.hides[1]:
             srf.evidence.n_unhidden = 0
     types.frame_index += 1
 

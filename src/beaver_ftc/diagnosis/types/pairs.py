@@ -175,16 +175,16 @@ def store_first(types, s):
     The wait is necessary because a second fault that begins to show may refute one type first, and all of
     them soon after: the sets from before it began must then still be there.
     """
-    pair, srf, new = types.pair, types.surface[s], False
-    kept = srf.first_sets
+    pair, srf, newly_excluded = types.pair, types.surface[s], False
+    stored = srf.first_sets
     for h in range(N_CONSTANT):
-        new = new or srf.sets.excluded[h] != kept.excluded[h]
-    pair.n_unstored = pair.n_unstored + 1 if new else 0
+        newly_excluded = newly_excluded or srf.sets.excluded[h] != stored.excluded[h]
+    pair.n_unstored = pair.n_unstored + 1 if newly_excluded else 0
     if pair.first_pitch != s or pair.n_unstored >= types.config.half_frames:
         pair.first_pitch, pair.n_unstored = s, 0
-        kept.low[:], kept.high[:] = srf.sets.low, srf.sets.high
-        kept.excluded[:] = 1
-        kept.excluded[:N_CONSTANT] = srf.sets.excluded[:N_CONSTANT]
+        stored.low[:], stored.high[:] = srf.sets.low, srf.sets.high
+        stored.excluded[:] = 1
+        stored.excluded[:N_CONSTANT] = srf.sets.excluded[:N_CONSTANT]
 
 
 @kernel

@@ -142,19 +142,21 @@ def narrow_return(c, srf, b, h):
     """Whether the judged frame agrees with some return in slot b; cut off the part of its interval that does
     not:
 
-        lo <- lo + max(seen.lo - low - tol, 0),    hi <- hi - max(high - tol - seen.hi, 0)
+        lo <- lo + max(judged.lo - low - tol, 0),    hi <- hi - max(high - tol - judged.hi, 0)
 
     This is valid because the mean over the frame rises with where the return began, and by no more than that,
     if the actuator is known. A return that has ended by now (`healthy`) explains nothing wrong.
     """
-    seen, lo, hi = srf.judged, srf.release.back_lo[b, h], srf.release.back_hi[b, h]
+    judged, lo, hi = srf.judged, srf.release.back_lo[b, h], srf.release.back_hi[b, h]
     (low, high), tols, _ = simulate_ends(c, srf, lo, hi)
     tol = max(tols)
-    healthy = max(abs(low - tol - seen.u), abs(high + tol - seen.u)) <= HEALTHY_RAD
-    if healthy or low - tol > seen.hi or high + tol < seen.lo:
+    healthy = max(abs(low - tol - judged.u), abs(high + tol - judged.u)) <= HEALTHY_RAD
+    if healthy or low - tol > judged.hi or high + tol < judged.lo:
         return False
     if not srf.actuator.uncertain:
-        set_return(srf.release, b, h, lo + max(seen.lo - low - tol, 0.0), hi - max(high - tol - seen.hi, 0.0))
+        set_return(
+            srf.release, b, h, lo + max(judged.lo - low - tol, 0.0), hi - max(high - tol - judged.hi, 0.0)
+        )
     return True
 
 
@@ -170,9 +172,9 @@ def held_set(c, srf, h, lo, hi):
     do not explain the frame must be forgotten.
     """
     returns = c.returns_lagged and keep_returns(c, srf, h)
-    released, seen = srf.release.released, srf.judged
-    if lo <= seen.hi and hi >= seen.lo and not released[h]:
-        return (seen.lo, seen.hi) if is_position(srf, h) else UNLIMITED_SET
+    released, judged = srf.release.released, srf.judged
+    if lo <= judged.hi and hi >= judged.lo and not released[h]:
+        return (judged.lo, judged.hi) if is_position(srf, h) else UNLIMITED_SET
     if not returns:
         return EMPTY_SET
     released[h] = 1
@@ -189,18 +191,18 @@ def begin_release(c, srf, h, lo, hi, stop):
     If the parameter is the position, and no earlier release is possible any more, the later ones become the
     earlier ones.
     """
-    rel, seen = srf.release, srf.judged if c.single_instant else srf.earlier
+    rel, judged = srf.release, srf.judged if c.single_instant else srf.earlier
     if is_position(srf, h) and not may_return(rel, EARLIER, h):
         for ends in (rel.back_lo, rel.back_hi, rel.set_lo, rel.set_hi):
             ends[EARLIER, h] = ends[LATER, h]
         forget_return(rel, LATER, h)
         rel.set_lo[LATER, h], rel.set_hi[LATER, h] = srf.sets.low[h], srf.sets.high[h]
     rel.held_lo[h], rel.held_hi[h] = EMPTY_SET
-    if max(lo, seen.lo) <= min(hi, seen.hi) and not rel.released[h]:
+    if max(lo, judged.lo) <= min(hi, judged.hi) and not rel.released[h]:
         if c.single_instant or stop != -1:
-            lo = max(lo, seen.lo)
+            lo = max(lo, judged.lo)
         if c.single_instant or stop != 1:
-            hi = min(hi, seen.hi)
+            hi = min(hi, judged.hi)
         rel.held_lo[h], rel.held_hi[h] = lo, hi
         widen_later(rel, h, lo, hi)
 

@@ -24,20 +24,20 @@ from beaver_ftc.diagnosis.types import (
 def consistent_interval(c, srf, h, k):
     """b = p - u of the surface in the judged frame, (lo, hi) rad; open at a stop:
 
-        lo = seen.lo - u    -inf if seen.lo - max(u - u_min, 0) <= stop_lo
-        hi = seen.hi - u    +inf if seen.hi + max(u_max - u, 0) >= stop_hi
+        lo = judged.lo - u    -inf if judged.lo - max(u - u_min, 0) <= stop_lo
+        hi = judged.hi - u    +inf if judged.hi + max(u_max - u, 0) >= stop_hi
 
     u_min, u_max: extremes of u within the frame: p was at most u - u_min below its mean. A surface that was
     at its stop at any instant of the frame may have a larger offset than it shows. An offset takes no surface
     beyond its stop: NO_THETA.
     """
-    seen, cmd, act = srf.judged, srf.commands, srf.actuator
-    if seen.hi < act.stop_lo or seen.lo > act.stop_hi:
+    judged, cmd, act = srf.judged, srf.commands, srf.actuator
+    if judged.hi < act.stop_lo or judged.lo > act.stop_hi:
         return NO_THETA
     lo, hi = judged_error(srf)
-    if seen.lo - max(seen.u - cmd.u_min[1], 0.0) <= act.stop_lo:
+    if judged.lo - max(judged.u - cmd.u_min[1], 0.0) <= act.stop_lo:
         lo = -np.inf
-    if seen.hi + max(cmd.u_max[1] - seen.u, 0.0) >= act.stop_hi:
+    if judged.hi + max(cmd.u_max[1] - judged.u, 0.0) >= act.stop_hi:
         hi = np.inf
     return lo, hi
 

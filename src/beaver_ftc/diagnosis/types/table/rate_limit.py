@@ -29,14 +29,14 @@ def consistent_interval(c, srf, h, k):
     a frame has several JSBSim steps, the first still follows the command of the frame before
     (`commands_of_frame`).
     """
-    seen, M, side, away = srf.judged, srf.rate_limit, side_of_commands(c, srf), False
+    judged, M, side, away = srf.judged, srf.rate_limit, side_of_commands(c, srf), False
     if side == 0 or side != M.side or k != M.k_last + 1:
-        M.lo, M.hi = seen.lo, seen.hi
+        M.lo, M.hi = judged.lo, judged.hi
     else:
-        away = seen.lo > M.hi if side == 1 else seen.hi < M.lo
+        away = judged.lo > M.hi if side == 1 else judged.hi < M.lo
         narrow_by_motion(c, srf, M, side)
-    M.lo = max(M.lo, seen.lo)
-    M.hi = min(M.hi, seen.hi)
+    M.lo = max(M.lo, judged.lo)
+    M.hi = min(M.hi, judged.hi)
     M.side, M.k_last = side, k
     return EMPTY_SET if away else UNLIMITED_SET
 

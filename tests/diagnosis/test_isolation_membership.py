@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from kernels import estimator, new_fdi, on
 
-from beaver_ftc.diagnosis import isolation
+from beaver_ftc.diagnosis import estimators
 from beaver_ftc.diagnosis.sets import explain
 
 AXES = st.tuples(*[st.floats(-1.0, 1.0)] * 3)
@@ -32,7 +32,7 @@ def test_the_true_theta_stays_in_every_set_and_sets_shrink(theta, frames, spread
         fie["set_lo"], fie["set_hi"], fie["theta"], fie["B"] = lo, hi, -0.5, 0.05
         fie["Om"] = Z
         fie["residual"] = fie["Om"] * (theta + 0.5) + 0.05 * np.array(error)
-        kept = on(isolation.theta_explains, fdi, fie), on(isolation.narrow_sets, fdi, fie)
+        kept = on(estimators.theta_explains, fdi, fie), on(estimators.narrow_sets, fdi, fie)
         assert all(kept)
         assert (fie["set_lo"] <= theta + 1e-9).all()
         assert (fie["set_hi"] >= theta - 1e-9).all()
@@ -61,8 +61,8 @@ def test_what_no_theta_explains_on_two_axes_together_is_excluded(theta, Z, beyon
     fdi, fie = explained(theta, np.zeros(3), Z, 0.05, np.zeros(3))
     fdi["bank"]["output"]["innovation"][:2] -= 0.15 + beyond
     at_rest = (np.abs(fdi["bank"]["output"]["innovation"]) <= 0.1).all()
-    both = on(isolation.theta_explains, fdi, fie)
+    both = on(estimators.theta_explains, fdi, fie)
     fie["skip"][:2] = 1
-    neither = on(isolation.theta_explains, fdi, fie)
+    neither = on(estimators.theta_explains, fdi, fie)
     assert at_rest or not both
     assert neither

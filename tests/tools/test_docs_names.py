@@ -10,7 +10,7 @@ GOOD = (
     "src/beaver_ftc/loop/frame.py", "beaver-ftc run elevator-partial-loss --no-report",
     "sweep FILE --workers 2", "bf.fly(scenario, detector=MyCusum())",
     "fdi: {scheme: cusum}", "test_docs_names.py",
-    "isolation.narrow_sets",
+    "estimators.narrow_sets",
 )  # fmt: skip
 WRONG = {
     "fdi.bounds.sensorss": "sensorss",

@@ -1,16 +1,8 @@
-"""The fault isolation estimators (FIE), their sets of parameters, and the decision among them.
+"""The isolation: hypotheses about the fault, the tests that exclude them, and the decision among them.
 
-The kernels stand in this order: set membership of one frame; records and configuration; then what happens in
-a frame, which is effect of each fault, tests that exclude it, decision, and estimator.
-
-The estimators start at detection:
-
-    xhats' = -Lambdas (xhats - x) + f + G u + h + Zs ths + Oms ths'
-    Oms' = -Lambdas Oms + Zs,  Oms(Td) = 0
-
-[Zhang2005, sec. IV]. In discrete time, with Omega[k+1] = a Omega[k] + dt Z[k] and the estimate's step
-multiplied by Omega[k+1], the residual of the true estimator is exactly Omega (theta - thetahat) plus the
-filtered uncertainty, for any course of the estimate.
+The kernels stand in this order: tolerance of a position; record and configuration; then the steps of a frame,
+which are the effect of each fault, the tests that exclude it, and the decision. estimators.py has the
+estimators and their sets of theta.
 
 Every hypothesis is linear in one unknown parameter per axis, phi_i = h_i + theta_i Z_i:
 
@@ -21,21 +13,12 @@ LOSS on aileron, elevator and rudder is the published class. POSITION_HYPOTHESIS
 does not follow its command. Its parameter, the deflection in rad, may change in any way, so it covers every
 fault of the surface. Both together are `fdi.fault_class: all`; types/ decides which type of fault it is.
 
-Set membership: the parameters theta of a fault that are consistent with the innovation nu on axis i,
-
-    |nu_i - h_i - theta Z_i| <= nu_max_i + r_i
-
-nu, h, Z, nu_max and r are in rad/s2 (Z per unit of theta). One surface has one parameter, so one theta must
-be consistent on all axes. For a parameter that may change in any way, no test frame by frame is sharper. For
-a constant loss (`fdi.fault_profile: abrupt`) the sets of all frames since the alarm are intersected, unless a
-second fault may begin later (`fdi.pairs`).
-
 Likelihood ratios exclude a loss of the published class, or confirm it. A confirmed loss is never excluded by
 likelihood. A loss that only the end of an undetected earlier loss could explain is weakly excluded: it is not
 isolated.
 
-The sharpened tests (detection/filters.py, set membership) exclude as well, each by its own switch. The first
-test that fails excludes a fault.
+The sharpened tests (detection/filters.py, set membership in estimators.py) exclude as well, each by its own
+switch. The first test that fails excludes a fault.
 
 Symbols of the kernels:
 
@@ -46,10 +29,7 @@ Symbols of the kernels:
     phi                           effect of a fault, h + theta Z within +- r (EFFECT_RECORD)
     known set                     [theta_min, theta_max], to which the hypothesis limits theta
     interval = (lo, hi)           of theta: without unit for a loss, rad for a position
-    Om, R_pos                     Omega, and the same of the positive part of Z
-    B, B_lag rad/s                bound on the filtered uncertainty, and its part with a memory
-    th, P                         estimate of theta and its variance
-    s, i, j                       surface, axis, estimator; in a loop over pairs of axes, j is the second axis
+    s, i, j                       surface, axis, estimator
     iso, fie, bank, bound, emap   records: isolation, estimator, bank, bounds, map of the model's error
     abrupt                        a fault is declared to stay as it is
 
@@ -65,15 +45,10 @@ import numpy as np
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.compiled import fill, kernel, record, sized
 from beaver_ftc.diagnosis.detection import parity, statistical
-from beaver_ftc.diagnosis.detection.filters import (
-    advance_bound,
-    advance_reach,
-    is_reachable,
-    published_interval,
-    residual_interval,
-)
+from beaver_ftc.diagnosis.detection.filters import advance_reach, is_reachable
 from beaver_ftc.diagnosis.error_map import level_of_share, share_used
-from beaver_ftc.diagnosis.sets import explain, intersect
+from beaver_ftc.diagnosis.estimators import ESTIMATOR_RECORD, narrow_sets, theta_explains, update_residual
+from beaver_ftc.diagnosis.sets import explain
 from beaver_ftc.diagnosis.state import (
     DAMAGE_EXCLUDES,
     INTERVAL_THRESHOLD,
@@ -85,31 +60,10 @@ from beaver_ftc.diagnosis.state import (
     UNANTICIPATED,
 )
 from beaver_ftc.scenario.declared import Declared
-from beaver_ftc.scenario.diagnosis import MAX_POLES
 
 # Rounds of `widen_error`. Each one multiplies the distance of u from its limit by eG / |Z|, the relative
 # error of the surface's effect.
 N_ROUNDS = 4
-
-
-@kernel
-def eta_explains(nu, nu_max):
-    """True if the declared uncertainty alone explains an innovation: |nu| <= nu_max."""
-    for i in range(3):
-        if not abs(nu[i]) <= nu_max[i]:
-            return False
-    return True
-
-
-@kernel
-def consistent_on(nu, nu_max, fie, phi, i):
-    """The interval of theta within the known set with |nu_i - h_i - theta Z_i| <= nu_max_i + r_i; the whole
-    known set if axis i is skipped (`fie.skip`): where pairs are diagnosed, a second fault may act on it.
-    """
-    if fie.skip[i]:
-        return fie.theta_min, fie.theta_max
-    e = nu_max[i] + phi.r[i]
-    return explain(nu[i] - phi.h[i], e, phi.Z[i], fie.theta_min, fie.theta_max)
 
 
 @kernel
@@ -170,53 +124,6 @@ def level_near(emap, fie, interval, n_substeps):
 
 
 @kernel
-def consistent_on_axes(nu, nu_max, fie, phi, axis):
-    """The interval of theta that is consistent on every axis; if `axis` >= 0, on that axis alone, and on
-    those where Z = 0, which exclude the fault or say nothing."""
-    interval = fie.theta_min, fie.theta_max
-    for i in range(3):
-        if axis < 0 or i == axis or phi.Z[i] == 0.0:
-            interval = intersect(interval, consistent_on(nu, nu_max, fie, phi, i))
-    return interval
-
-
-@kernel
-def theta_explains(fie, nu, nu_max):
-    """True if one theta of the known set, or no fault at all, is consistent with the elapsed frame:
-
-        |nu_i - h_i - theta Z_i| <= eta_bar_i + r_i + (n_i[k] + n_i[k-1]) / dt      on every axis i
-
-    eta_bar + (n[k] + n[k-1]) / dt is nu_max (`filters.update_bank`).
-    """
-    lo, hi = consistent_on_axes(nu, nu_max, fie, fie.effect, -1)
-    return lo <= hi or eta_explains(nu, nu_max)
-
-
-@kernel
-def narrow_sets(fie, nu, nu_max, shared):
-    """Intersect the sets of a constant theta with what the frame and the filtered residual allow; false if
-    one of them is empty. Each axis narrows its own set, or, if `shared`, every axis narrows all three.
-
-        |eps + Om th - Om theta| <= B      |nu - h - theta Z| <= nu_max + r
-
-    The first holds for any course of the estimate th. Its theta are those from (eps + Om th - B) / Om to (eps
-    + Om th + B) / Om.
-    """
-    for i in range(3):
-        eps = fie.residual[i] + fie.Om[i] * fie.theta[i]
-        interval = explain(eps, fie.B[i], fie.Om[i], fie.theta_min, fie.theta_max)
-        interval = intersect(interval, consistent_on(nu, nu_max, fie, fie.effect, i))
-        for j in range(3):
-            if shared or j == i:
-                before = fie.set_lo[j], fie.set_hi[j]
-                fie.set_lo[j], fie.set_hi[j] = intersect(before, interval)
-    for i in range(3):
-        if fie.set_lo[i] > fie.set_hi[i]:
-            return False
-    return True
-
-
-@kernel
 def add_to_mean(mean, phi, w, begins):
     """mean <- mean + w phi, each an EFFECT_RECORD; w: share of a frame in its block. If the block `begins`
     with this frame, the mean is zero before."""
@@ -226,30 +133,6 @@ def add_to_mean(mean, phi, w, begins):
         mean.h[i] += w * phi.h[i]
         mean.Z[i] += w * phi.Z[i]
         mean.r[i] += w * phi.r[i]
-
-
-# Acceleration by a fault, rad/s2: h + theta Z, within +/- r.
-EFFECT_RECORD = record(h=3, Z=3, r=3)
-
-# An isolation estimator: its hypothesis, the tests that exclude it, its estimate.
-ESTIMATOR_RECORD = record(
-    hypothesis_kind=int, surface=int,
-    theta_min=float, theta_max=float,  # the known set of theta
-    # skip: whether an axis cannot exclude the fault; residual, its thresholds mu_lo and mu_hi: rad/s
-    excluded=int, excluded_at_s=float, pending=int, skip=(int, 3), xhat=3, residual=3, mu_lo=3, mu_hi=3,
-    confirmed=int, weak=int, unlikely=int,  # by likelihood ratios; unlikely: in this frame
-    # R_pos: as Omega, of the positive part of Z; B, B_lag: rad/s
-    # effect: of the frame; mean_effect: of a block of frames (examination.py)
-    Om=3, R_pos=3, B=3, B_lag=3, theta=3, P=3, effect=EFFECT_RECORD,
-    mean_effect=EFFECT_RECORD,
-    # In the last frame: the largest distance from neutral that the surface's mean position can have had, rad;
-    # the largest share of its travel that it can have used.
-    u_far=float, share_far=float,
-    # test on the residuals of the bank (filters.py): the parity direction m; the reach, rad/s, by filter, on
-    # roll, pitch, yaw and along m
-    parity_direction=3, reach_lo=(MAX_POLES, 4), reach_hi=(MAX_POLES, 4),
-    set_lo=3, set_hi=3,  # what the frames since the alarm leave of the known set
-)  # fmt: skip
 
 
 @sized
@@ -352,38 +235,6 @@ def update_effects(iso, bank, bound, config, detected, G, Gu, e_Gu):
 
 
 @kernel
-def start_estimators(iso, n, x):
-    """Start every estimator at the measured x, with the prior of theta; n (3,): of `n_gyro`.
-
-    The set of a constant theta is the known one on every axis, or without limits if iso.config.free.
-    """
-    for fie in iso.estimator[: iso.config.n_estimators]:
-        fie.xhat[:], fie.B_lag[:] = x, n
-        fie.P[:] = (fie.theta_max - fie.theta_min) ** 2 / 12.0  # of a uniform distribution
-        fie.set_lo[:] = -np.inf if iso.config.free else fie.theta_min
-        fie.set_hi[:] = np.inf if iso.config.free else fie.theta_max
-
-
-@kernel
-def update_residual(fie, kind, x):
-    """Fill eps = x - xhat, rad/s, and its thresholds (mu_lo, mu_hi) by `kind`: of `residual_interval`, of
-    `published_interval`, or +- B; true if eps is within them on every axis that is not skipped.
-    """
-    within = True
-    for i in range(3):
-        fie.residual[i] = x[i] - fie.xhat[i]
-        lo, hi, Om, th, B = fie.theta_min, fie.theta_max, fie.Om[i], fie.theta[i], fie.B[i]
-        mu = -B, B
-        if kind == INTERVAL_THRESHOLD:
-            mu = residual_interval(lo, hi, fie.R_pos[i], Om - fie.R_pos[i], Om, th, B)
-        elif kind == PUBLISHED_THRESHOLD:
-            mu = published_interval(lo, hi, Om, th, B)
-        fie.mu_lo[i], fie.mu_hi[i] = mu
-        within = within and (mu[0] <= fie.residual[i] <= mu[1] or fie.skip[i])
-    return within
-
-
-@kernel
 def fault_possible(iso, fie, bank, nu_max, abrupt, x, started):
     """True if no test that is switched on excludes the fault of estimator fie:
 
@@ -435,80 +286,6 @@ def decide_isolation(iso, t):
     if n == 0:
         return UNANTICIPATED
     return remaining if n == 1 and t - last_exclusion_s >= iso.config.hold_s else NOT_ISOLATED
-
-
-@kernel
-def least_squares_step(fie, i, eps, forget):
-    """One least-squares step of theta_i on a residual eps, rad/s, projected onto its set; returns the step.
-
-        S = B^2 + Om^2 P      th <- th + P Om / S eps      P <- min(P B^2 / S / forget, prior)
-
-    forget = exp(-dt / tau), tau s: forgetting_time_s. prior: the variance (theta_max - theta_min)^2 / 12 of a
-    uniform theta. B bounds the filtered uncertainty, so the estimate changes no faster than its information
-    allows.
-    """
-    th, B2, P_Om = fie.theta[i], fie.B[i] ** 2, fie.P[i] * fie.Om[i]
-    S = B2 + fie.Om[i] * P_Om
-    if S <= 0.0:
-        return 0.0
-    fie.theta[i] = min(max(th + P_Om / S * eps, fie.set_lo[i]), fie.set_hi[i])
-    fie.P[i] = min(fie.P[i] * B2 / S / forget, (fie.theta_max - fie.theta_min) ** 2 / 12.0)
-    return fie.theta[i] - th
-
-
-@kernel
-def joint_least_squares(fie, forget):
-    """A least-squares step of one theta shared by the axes, axis after axis: eps_i = residual_i - Om_i total,
-    with the steps of the axes before in `total`. Returns the total. P is divided by `forget` once a frame."""
-    total = 0.0
-    for i in range(3):
-        if i > 0:
-            fie.theta[i], fie.P[i] = fie.theta[i - 1], fie.P[i - 1]
-        if fie.effect.Z[i] != 0.0:
-            total += least_squares_step(fie, i, fie.residual[i] - fie.Om[i] * total, forget)
-            forget = 1.0
-    fie.theta[:], fie.P[:] = fie.theta[2], fie.P[2]
-    return total
-
-
-@kernel
-def advance_estimator(iso, fie, bound, x, F, dt):
-    """Advance one estimator by a frame: estimate, predicted rates, and filtered Z and bounds.
-
-        Om <- a Om + dt Z      R_pos <- a R_pos + dt max(Z, 0)      R_neg = Om - R_pos
-        xhat <- x + dt (F + h + Z th) + a (xhat - x) + Om step
-        B_lag <- a B_lag + dt (eta_bar + r) + (1 - a) n_old         B = B_lag + n
-        th <- P{th + dt gain Om eps} by gradient [Zhang2005, sec. IV], or by least squares
-
-    B_lag = B_eta + T_n; step: that of th (Delta in isolation.md). x is measured at the start of the frame, as
-    is the residual eps; fie.effect must be that of this frame. The order matters: th moves before Om, which
-    then carries the step into xhat.
-    """
-    cfg, phi, th = iso.config, fie.effect, fie.theta
-    for i in range(3):
-        effect = F[i] + phi.h[i] + phi.Z[i] * th[i]
-        fie.xhat[i] = x[i] + dt * effect + cfg.a[i] * (fie.xhat[i] - x[i])
-    step = joint_least_squares(fie, cfg.forget) if cfg.shared else 0.0
-    for i in range(3):
-        a, Z = cfg.a[i], phi.Z[i]
-        if cfg.gradient:
-            old = th[i]
-            th[i] = min(max(old + dt * cfg.gain * fie.Om[i] * fie.residual[i], fie.set_lo[i]), fie.set_hi[i])
-            step = th[i] - old
-        elif not cfg.shared:
-            step = least_squares_step(fie, i, fie.residual[i], cfg.forget)
-        fie.Om[i] = a * fie.Om[i] + dt * Z
-        fie.R_pos[i] = a * fie.R_pos[i] + dt * max(Z, 0.0)
-        fie.xhat[i] += fie.Om[i] * step
-        fie.B_lag[i] = advance_bound(fie.B_lag[i], bound.eta_bar[i] + phi.r[i], a, dt, bound.n_old[i])
-        fie.B[i] = fie.B_lag[i] + bound.n_gyro[i]
-
-
-@kernel
-def advance_estimators(iso, bound, x, F, dt):
-    """Advance the estimators by a frame; arguments as in `advance_estimator`."""
-    for fie in iso.estimator[: iso.config.n_estimators]:
-        advance_estimator(iso, fie, bound, x, F, dt)
 
 
 @kernel

@@ -18,7 +18,7 @@ The isolation depends on the fault class, and on the detectors whose exclusions 
 from beaver_ftc.compiled import apart, kernel
 from beaver_ftc.design.model import unanticipated_pitch
 from beaver_ftc.design.table import AIRSPEED, ALPHA, BETA
-from beaver_ftc.diagnosis import conclusion, gusts, isolation
+from beaver_ftc.diagnosis import conclusion, estimators, gusts, isolation
 from beaver_ftc.diagnosis.detection import attitude, fdae, filters, forces, parity, statistical
 from beaver_ftc.diagnosis.detection.rows import finish_rows, update_forces
 from beaver_ftc.diagnosis.model_prediction import fill_old_effects, innovation_known
@@ -47,7 +47,7 @@ def update_estimators(fdi, pred):
     cfg, iso, bound, means, detected = fdi.config, fdi.isolation, fdi.bound, pred.means, fdi.verdict.detected
     isolation.update_effects(iso, fdi.bank, bound, cfg, detected, means.G, means.Gu, means.e_Gu)
     if detected and not sensor_monitor.has_alarm(fdi.sensor_monitor):
-        isolation.advance_estimators(iso, bound, pred.x_before, means.F, cfg.dt)
+        estimators.advance_estimators(iso, bound, pred.x_before, means.F, cfg.dt)
 
 
 @kernel
@@ -70,7 +70,7 @@ def continue_isolation(fdi, meas, t, before):
     """
     monitor = fdi.sensor_monitor
     if not before:
-        isolation.start_estimators(fdi.isolation, fdi.bound.n_gyro, meas.x)
+        estimators.start_estimators(fdi.isolation, fdi.bound.n_gyro, meas.x)
         if fdi.config.diagnoses_all_types:
             begin_types(fdi)
     allowed = sensor_monitor.allows_isolation(monitor, before, fdi.verdict.detected_at_s)

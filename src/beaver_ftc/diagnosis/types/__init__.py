@@ -41,7 +41,7 @@ modes.py what the law does about it, and findings.py puts it in words; they name
     nu, nu_max (3,) innovation and its bound without a fault, rad/s2
     c, M            TYPES_CONFIG_RECORD of records.py, memory of a type
     est, fie        estimators of the isolation, and one of them
-    eff             effect of the fault of an estimator in the frame (EFFECT_RECORD of isolation.py)
+    eff             effect of the fault of an estimator in the frame (EFFECT_RECORD of estimators.py)
 """
 
 from collections.abc import Callable
@@ -51,7 +51,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from beaver_ftc.compiled import kernel, record
-from beaver_ftc.diagnosis import isolation
+from beaver_ftc.diagnosis import estimators
 from beaver_ftc.diagnosis.sets import EMPTY_SET, UNLIMITED_SET, intersect
 
 Kernel = Callable[..., Any]
@@ -285,7 +285,7 @@ def observe_surface(c, srf, fie, m, nu, nu_max, eff):
     last.u = -eff.h[m] / eff.Z[m]
     last.kappa = 0.25 * (cmd.G_max - cmd.G_min) / abs(eff.Z[m])
     axis = m if c.frames_per_block > 1 else -1
-    last.lo, last.hi = isolation.consistent_on_axes(nu, nu_max, fie, eff, axis)
+    last.lo, last.hi = estimators.consistent_on_axes(nu, nu_max, fie, eff, axis)
     mark_stops(srf, 2.0 * (nu_max[m] + eff.r[m]) / abs(eff.Z[m]))
 
 

@@ -22,7 +22,7 @@ types: of `fault_types_dtype`. est: the estimators of the isolation; the layout 
 import numpy as np
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.diagnosis import isolation
+from beaver_ftc.diagnosis import estimators, isolation
 from beaver_ftc.diagnosis.types import (
     GIVE_UP,
     REST_EXCLUDES_TYPE,
@@ -101,7 +101,7 @@ def record_commands(types, commands, ext):
 @kernel
 def observe_surfaces(types, layout, est, nu, nu_max):
     """Find where each surface was in the elapsed frame, or block, if it alone is at fault."""
-    anomalous = not isolation.eta_explains(nu, nu_max)
+    anomalous = not estimators.eta_explains(nu, nu_max)
     for s, srf in enumerate(types.surface):
         copy_observation(srf.earlier, srf.judged)
         copy_observation(srf.judged, srf.last)

@@ -53,8 +53,8 @@ PARTS: dict[str, dict[str, Kernel]] = {
     # the isolation estimators, and the decision among them
     "fies": {
         "diagnosis.isolation.update_effects": nothing,
-        "diagnosis.isolation.advance_estimators": nothing,
-        "diagnosis.isolation.start_estimators": nothing,
+        "diagnosis.estimators.advance_estimators": nothing,
+        "diagnosis.estimators.start_estimators": nothing,
         "diagnosis.schemes.adaptive_estimators.continue_isolation": nothing,
     },
     # the bound on the uncertainty, and every threshold that follows from it

@@ -247,7 +247,7 @@ def set_problem(problem, G, layout, effectiveness, prediction, share, probe):
     that it prefers, rad, and the weight with which it leaves that, rad2.
 
         low, high = u -+ reach, within the stops        reach: by the rate limit in a frame, rad
-        u_preferred = trim / effectiveness, within the stops
+        u_preferred = trim / E, within the stops        E: effectiveness; trim if E is 0
         weight = half^2,  of a backup half^2 ratio      half: half the travel, rad
         ratio = share others / ((1 - share) backups)    within RELUCTANT and 1 / RELUCTANT
 

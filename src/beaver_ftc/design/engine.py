@@ -58,9 +58,9 @@ def slipstream_slopes(y, k):
 def power_error_kw(
     engine_rpm: float, manifold_pressure_inhg: float, rpm_error: float, inhg_error: float
 ) -> tuple[float, float]:
-    """How far the power can be off, kW: for errors of the instruments, and for the whole of the density.
-
-    The readings are within the errors of what is given, the density within that at sea level.
+    """Largest error of `engine_power_kw`, kW: by the errors of the instruments, at a density of at most that
+    at sea level; and per 1 of error in the density ratio. The true speed and pressure are within rpm_error
+    and inhg_error of the given ones.
     """
     rpm, pressure = engine_rpm + rpm_error, manifold_pressure_inhg + 7.4 + inhg_error
     by_chart = 0.00412 * (pressure * rpm_error + (rpm + 2010.0) * inhg_error)

@@ -46,7 +46,7 @@ def listened(given, signals, missed, forgets=True):
     """The record after all frames."""
     record = np.zeros(1, estimator_dtype(N)).view(np.recarray)[0]
     effectiveness_estimator.begin_estimator(record, np.zeros(3), np.zeros(3), DT)
-    record.unsure[:] *= forgets
+    record.prior[:] *= forgets
     y = np.zeros(8)
     for moments, signal, off in zip(given, signals, missed, strict=True):
         y[ALPHA], y[BETA] = signal[:2]
@@ -80,11 +80,11 @@ def test_it_is_least_squares_over_the_whole_past():
     assert expected.min() > -1.0
     assert abs(expected - THETA).max() < 0.05
     free = np.abs(THETA) > 0.0  # those that nothing holds at a limit on the way
-    assert record.found[:N][free] == pytest.approx(expected[free], abs=0.03)
+    assert record.parameters[:N][free] == pytest.approx(expected[free], abs=0.03)
 
 
 @pytest.mark.parametrize("seed", range(2))
 def test_each_surface_is_found_while_the_airframe_has_changed(seed):
     record = listened(*flown(seed))
-    assert [1.0 + theta for theta in record.found[:N]] == pytest.approx(1.0 + THETA, abs=0.1)
+    assert [1.0 + theta for theta in record.parameters[:N]] == pytest.approx(1.0 + THETA, abs=0.1)
     assert effectiveness_estimator.effectiveness_of(record, 0) == pytest.approx(0.1, abs=0.1)

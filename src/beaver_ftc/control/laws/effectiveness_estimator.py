@@ -33,24 +33,34 @@ from beaver_ftc.design.table import ALPHA, BETA
 
 OBSERVER_ERROR = record(rate=3, disturbance=3)  # e and dd of one acceleration
 _SIGNALS = 5  # in y: alpha, beta, p, q, r
-_FEW = 4  # Of so few surfaces, each leads an axis or stands in, and evidence.py estimates one at a time.
-_UNSURE = 0.5  # standard deviation of a surface's theta at the start
-_AIRFRAME = np.array([30.0, 30.0, 3.0, 3.0, 3.0])  # standard deviations of A at the start, 1/s2 and 1/s, as y
-_CORRELATED = 10.0  # So many frames of the innovation count as one, since it is no white noise.
+_FEW = 4  # Each of so few surfaces leads an axis or stands in, and evidence.py estimates one at a time.
+_THETA_STD = 0.5  # standard deviation of the theta of a surface at the start
+_A_STD = np.array([30.0, 30.0, 3.0, 3.0, 3.0])  # standard deviations of A at the start, 1/s2 and 1/s, as y
+_CORRELATED = 10.0  # This many frames of the innovation count as one, because it is no white noise.
 _LEAST_NOISE_RAD_S2 = 0.05  # smallest standard deviation of the noise, as an acceleration over a frame
 _FORGOTTEN_S = 30.0  # time in which the variance of a parameter that is not seen returns to its first value
 
 
 @sized
 def estimator_dtype(n: int) -> np.dtype:
-    """Memory for n surfaces. active: whether the estimator runs. found (N,): theta of each surface, then A
-    row by row; P (N, N): covariance of found; unsure (N,): its variances at the start. errors: answers of the
-    observer to the moment of each surface, to each signal, and to the assumed moments minus the healthy ones.
-    noise (3,) (rad/s)2: variance of the innovation in health. h, Ph (N,): for the update."""
+    """Memory for n surfaces.
+
+    active            whether the estimator runs
+    noise (3,)        (rad/s)2, variance of the innovation in health
+    parameters (N,)   w: theta of each surface, then A row by row; N = n + 15
+    P (N, N)          covariance of w
+    prior (N,)        variances of w at the start
+    errors            answers of the observer to the moment of each surface, to each signal, and to the
+                      assumed moments minus the healthy ones
+    signal (5,)       y
+    h, Ph (N,)        regressors of w, and P h
+
+    An aircraft with few surfaces has no estimator: its arrays have one element (evidence.py estimates).
+    """
     many = n > _FEW
     size, errors = (n + 3 * _SIGNALS, n + _SIGNALS + 1) if many else (Room(1), Room(1))
     return record(
-        active=int, noise=3, found=size, P=(size, size), h=size, Ph=size, unsure=size,
+        active=int, noise=3, parameters=size, P=(size, size), h=size, Ph=size, prior=size,
         errors=(OBSERVER_ERROR, errors), signal=_SIGNALS,
     )  # fmt: skip
 
@@ -70,17 +80,17 @@ def observer_response(error, i, acceleration, L_rate, L_disturbance, dt):
 
 @apart
 def begin_estimator(estimator, squares, frames, dt):
-    """Begin to estimate, with nothing known: found = 0, P diagonal, of the variances of theta and A.
+    """Begin to estimate without knowledge: w = 0, P = diag(prior).
 
     noise_i = _CORRELATED squares_i / frames_i, (rad/s)2, from sums of squares of the innovation over `frames`
-    (3,) in health; at least _LEAST_NOISE_RAD_S2 over a frame of dt s.
+    (3,) in health; its root is at least _LEAST_NOISE_RAD_S2 dt before the factor; dt s.
     """
     estimator.active = 1
-    N, n = estimator.found.size, estimator.found.size - 3 * _SIGNALS
-    estimator.P[:], estimator.found[:] = 0.0, 0.0
+    N, n = estimator.parameters.size, estimator.parameters.size - 3 * _SIGNALS
+    estimator.P[:], estimator.parameters[:] = 0.0, 0.0
     for j in range(N):
-        spread = _UNSURE if j < n else _AIRFRAME[(j - n) % _SIGNALS]
-        estimator.P[j, j] = estimator.unsure[j] = spread * spread
+        spread = _THETA_STD if j < n else _A_STD[(j - n) % _SIGNALS]
+        estimator.P[j, j] = estimator.prior[j] = spread * spread
     least = _LEAST_NOISE_RAD_S2 * dt
     for i in range(3):
         estimator.noise[i] = _CORRELATED * max(squares[i] / max(frames[i], 1.0), least * least)
@@ -90,20 +100,21 @@ def begin_estimator(estimator, squares, frames, dt):
 
 @apart
 def estimate(estimator, innovation, L_rate, L_disturbance, dt, x, y, effectiveness, moments):
-    """Take in the innovation of all axes (3,) rad/s, axis by axis:
+    """Update w and P with the innovation of all axes (3,) rad/s, axis by axis:
 
-        P_jj <- min(P_jj + unsure_j dt / FORGOTTEN_S, max(P_jj, unsure_j))        what is old may have changed
-        seen = innovation_i + observed((effectiveness - 1)' moments_i) = h' found,  h: observed(moments_i, y)
-        found <- found - P_s (found_s - limited(found_s)) / P_ss        for each surface s beyond [-1, 0]
+        P_jj <- min(P_jj + prior_j dt / FORGOTTEN_S, max(P_jj, prior_j))        old knowledge fades
+        z = innovation_i + observed((effectiveness - 1)' moments_i),    h = observed(moments_i, y)
+        `update` with z = h' w + noise
+        w <- w - P_s (w_s - limited(w_s)) / P_ss        for each surface s with w_s beyond [-1, 0]
 
     observed: `observer_response`, with L_rate 1 and L_disturbance 1/s (3,), the observer's gains.
     x (3,) rad/s, y: measured; effectiveness (n,): that the law assumes; moments (3, n) rad/s2: of healthy
     surfaces.
     """
-    n, h, signal, unsure = effectiveness.size, estimator.h, estimator.signal, estimator.unsure
-    P, found, errors = estimator.P, estimator.found, estimator.errors
+    n, h, signal, prior = effectiveness.size, estimator.h, estimator.signal, estimator.prior
+    P, w, errors = estimator.P, estimator.parameters, estimator.errors
     for j in range(h.size):
-        P[j, j] = min(P[j, j] + unsure[j] * dt / _FORGOTTEN_S, max(P[j, j], unsure[j]))
+        P[j, j] = min(P[j, j] + prior[j] * dt / _FORGOTTEN_S, max(P[j, j], prior[j]))
     signal[0], signal[1] = y[ALPHA], y[BETA]
     signal[2:] = x
     for i in range(3):
@@ -114,33 +125,33 @@ def estimate(estimator, innovation, L_rate, L_disturbance, dt, x, y, effectivene
             h[s] = observer_response(errors[s], i, moments[i, s], L, M, dt)
         for j in range(_SIGNALS):
             h[n + i * _SIGNALS + j] = observer_response(errors[n + j], i, signal[j], L, M, dt)
-        seen = innovation[i] + observer_response(errors[n + _SIGNALS], i, assumed, L, M, dt)
-        update(estimator, seen, estimator.noise[i])
+        z = innovation[i] + observer_response(errors[n + _SIGNALS], i, assumed, L, M, dt)
+        update(estimator, z, estimator.noise[i])
     for s in range(n):
-        beyond = found[s] - min(max(found[s], -1.0), 0.0)
+        beyond = w[s] - min(max(w[s], -1.0), 0.0)
         if beyond != 0.0:
             for j in range(h.size):
-                found[j] -= P[j, s] * (beyond / P[s, s])
+                w[j] -= P[j, s] * (beyond / P[s, s])
 
 
 @kernel
-def update(estimator, seen, noise):
-    """One step of recursive least squares, for seen = h' found + noise; noise: its variance, (rad/s)2.
+def update(estimator, z, noise):
+    """One step of recursive least squares, for z = h' w + noise, rad/s; noise: its variance, (rad/s)2.
 
-        found <- found + P h r / v,    P <- P - P h h' P / v,    r = seen - h' found,    v = noise + h' P h
+        w <- w + P h r / v,    P <- P - P h h' P / v,    r = z - h' w,    v = noise + h' P h
 
-    found, h (N,), P (N, N); Ph: P h.
+    w, h (N,), P (N, N); Ph: P h.
     """
-    found, h, P, Ph = estimator.found, estimator.h, estimator.P, estimator.Ph
-    v, r = noise, seen
+    w, h, P, Ph = estimator.parameters, estimator.h, estimator.P, estimator.Ph
+    v, r = noise, z
     for j in range(h.size):
         Ph[j] = 0.0
         for k in range(h.size):
             Ph[j] += P[j, k] * h[k]
         v += h[j] * Ph[j]
-        r -= h[j] * found[j]
+        r -= h[j] * w[j]
     for j in range(h.size):
-        found[j] += Ph[j] / v * r
+        w[j] += Ph[j] / v * r
         for k in range(h.size):
             P[j, k] -= Ph[j] * Ph[k] / v
 
@@ -148,4 +159,4 @@ def update(estimator, seen, noise):
 @kernel
 def effectiveness_of(estimator, s):
     """Effectiveness of surface s, 1 + theta_s, 0 to 1."""
-    return min(max(1.0 + estimator.found[s], 0.0), 1.0)
+    return min(max(1.0 + estimator.parameters[s], 0.0), 1.0)

@@ -247,7 +247,7 @@ def schedule(config, memory, qdyn, transfer_share):
 def start_or_end_estimator(memory, layout, detected, dt):
     """Activate the estimator at the alarm, if the allocation is general and the estimator has room for all
     surfaces; end it without an alarm. Its noise model is that of the innovation up to the alarm."""
-    if not (detected and layout.general and memory.estimator.found.size > 1):
+    if not (detected and layout.general and memory.estimator.parameters.size > 1):
         memory.estimator.active = 0
     elif not memory.estimator.active:
         begin_estimator(memory.estimator, memory.sums.innovation, memory.sums.frames, dt)

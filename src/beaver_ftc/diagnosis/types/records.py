@@ -53,8 +53,8 @@ FEASIBLE_SETS_RECORD = record(low=N_TYPES, high=N_TYPES, excluded=(int, N_TYPES)
 
 # Evidence, counted in blocks that are judged.
 EVIDENCE_RECORD = record(
-    # blocks in which something was wrong, and blocks in which nothing was, but a surface that was given up
-    # stayed where it rests: that is evidence too (`count_rest`)
+    # blocks in which something was wrong, and blocks in which nothing was wrong, but a surface that was given
+    # up stayed where it rests: this is evidence too (`count_rest`)
     n_anomalous=int,
     n_rest=int,  # of n_anomalous, the blocks in which this surface stayed where it rests
     n_unhidden=int,  # of n_anomalous, the blocks since a stop could last hide a deflection

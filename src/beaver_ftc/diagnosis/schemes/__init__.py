@@ -81,10 +81,11 @@ def configure_diagnosis(fdi: np.void, pred: np.void, declared: Declared, travel:
 
 
 def prepare_takeover(fdi: np.void, in_flight: bool) -> None:
-    """Prepare a configured diagnosis to take over from another of the same flight, of which nothing goes on.
+    """Prepare a configured diagnosis to take over from another one in the same flight. No state of that one
+    continues.
 
-    in_flight: whether the air moves by then. The sensor monitor's first JSBSim frame begins a frame of the
-    loop.
+    in_flight: whether the air already moves. The first JSBSim frame of the sensor monitor then begins a frame
+    of the loop.
     """
     for name in ("gust", "vaneless", "vaned"):
         memory = fdi["statistical"][name]["memory"]
@@ -100,8 +101,9 @@ def _refuse_pairs(declared: Declared) -> None:
 
 @kernel
 def record_isolated_surfaces(fdi, t):
-    """Record at t s which surfaces are isolated, and of which type: those that the pairs leave, or the one
-    surface of the conclusion; none (`void`) once a sensor is found broken."""
+    """Record at t s which surfaces are isolated, and the type of each: where pairs are diagnosed, as their
+    status says, else the one surface of the conclusion; none (`void`) once a sensor is found broken, unless
+    the monitor keeps the surface."""
     conclusion, monitor, pairs = fdi.verdict, fdi.sensor_monitor, fdi.types.pair.enabled
     void = sensor_monitor.has_alarm(monitor) and not monitor.output.keeps_surface
     sole = conclusions.isolated_surface(conclusion, fdi.isolation.estimator)
@@ -116,7 +118,15 @@ def record_isolated_surfaces(fdi, t):
 
 @kernel
 def reason_of_withdrawal(fdi, s, isolated):
-    """Why surface s is isolated no longer, or else its type: the first reason that holds."""
+    """The reason why the isolation of surface s, or its type, ends in this frame: the first that applies.
+
+    PLUGIN_DECIDES      the scheme is a plug-in
+    SURFACE_REFUTED     the estimator of the surface is excluded (of its position, if all types are
+                        diagnosed, else of its loss)
+    TYPES_REFUTED       the stored types of the first fault in pitch are refuted, or no type of the name
+                        that it had remains
+    SEVERAL_POSSIBLE    otherwise
+    """
     cfg, surf = fdi.config, fdi.types.surface[s]
     j = fdi.layout.position[s] if cfg.diagnoses_all_types else fdi.layout.loss[s]
     if cfg.scheme_number == PLUGIN_SCHEME:
@@ -147,8 +157,8 @@ def detection_share(fdi):
 
 @apart
 def begin_scheme(fdi, prediction, measured):
-    """Begin the detection filters at the first frame, all of the gyros' errors to come; fix the parity
-    direction of each fault."""
+    """Begin the detection filters at the first frame, with the bound on the errors of the gyros; fix the
+    parity direction of each fault."""
     fdae.start(fdi.bank, fdi.fdae, measured.x, fdi.bound.n_gyro)
     directions.set_directions(fdi.isolation, prediction.G)
 

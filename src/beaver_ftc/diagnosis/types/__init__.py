@@ -154,7 +154,7 @@ class FaultType:
     frames_test             name of the comparison of frames that excludes it, where one frame or two do not
                             suffice: "offset", "growing offset", "runaway", "swing" or "approach"
 
-    Words, Python functions (verdict.py):
+    Words, Python functions (findings.py):
 
     estimate_parameter(fdi, s, h)
                             its parameter, None without one

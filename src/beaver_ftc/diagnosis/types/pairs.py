@@ -55,20 +55,21 @@ def latch_groups(pair, bank):
 
 
 @kernel
-def locate_one(srf, own, other, nu, nu_max):
+def locate_one(srf, eff, eff_other, nu, nu_max):
     """Find where one of ailerons and rudder was in the elapsed frame: nu = G (p - u) + eta, two equations,
     solved for this surface by Cramer's rule. False if it was nowhere within its reach.
 
         p - u = (nu_L N - nu_N L) / det +- (e_L |N| + e_N |L|) / |det|,    det = L1 N - N1 L
 
-    nu_L, nu_N             rad/s2             innovation in roll and yaw
-    L1, N1; L, N           rad/s2 per rad     effect in roll and yaw of this surface (own); of the other
-    e_L, e_N               rad/s2             nu_max + r_own + r_other of the axis
+    nu_L, nu_N         rad/s2            innovation in roll and yaw
+    L1, N1; L, N       rad/s2 per rad    effect in roll and yaw of this surface (eff); of the other
+    (eff_other) e_L, e_N           rad/s2            nu_max of the axis, and the tolerances r of both effects
     """
-    L, N = other.Z[ROLL], other.Z[YAW]
-    det = own.Z[ROLL] * N - own.Z[YAW] * L
-    e_L = nu_max[ROLL] + own.r[ROLL] + other.r[ROLL]
-    e_N = nu_max[YAW] + own.r[YAW] + other.r[YAW]
+    L1, N1 = eff.Z[ROLL], eff.Z[YAW]
+    L, N = eff_other.Z[ROLL], eff_other.Z[YAW]
+    det = L1 * N - N1 * L
+    e_L = nu_max[ROLL] + eff.r[ROLL] + eff_other.r[ROLL]
+    e_N = nu_max[YAW] + eff.r[YAW] + eff_other.r[YAW]
     return observe_error(srf, (nu[ROLL] * N - nu[YAW] * L) / det, (e_L * abs(N) + e_N * abs(L)) / abs(det))
 
 
@@ -76,9 +77,9 @@ def locate_one(srf, own, other, nu, nu_max):
 def locate_lateral(types, layout, est, nu, nu_max):
     """Find where ailerons and rudder were in the elapsed frame, two deflections in two equations."""
     a, r = layout.main[ROLL], layout.main[YAW]
-    for s, other in ((a, r), (r, a)):
-        own, effect = est[layout.position[s]].effect, est[layout.position[other]].effect
-        if not locate_one(types.surface[s], own, effect, nu, nu_max):
+    for s, s_other in ((a, r), (r, a)):
+        eff, eff_other = est[layout.position[s]].effect, est[layout.position[s_other]].effect
+        if not locate_one(types.surface[s], eff, eff_other, nu, nu_max):
             types.pair.lateral_outside = 1
 
 

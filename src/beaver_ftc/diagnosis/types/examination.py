@@ -141,27 +141,27 @@ def judge_frame(types):
         2  A type that holds the surface may release it. It takes the sets as they were before this frame is
            judged, and where the type holds the surface as the release begins: in frame k if a frame has one
            instant, else in frame k - 1.
-        3  rests: `count_rest`. judges: count the anomaly, and test every type with the releases of step 2.
+        3  rests: `count_rest`. counts: count the anomaly, and test every type with the releases of step 2.
         4  Returns after a release that step 3 has left move on to the end of the frame.
         5  A frame in which a stop may hide a swing restarts `n_unhidden`.
 
-    rests: given up, and nothing wrong in the frame (of a fault declared to stay). judges: something wrong in
-    it; with several instants a frame also in the frame before and in the one after.
+    rests: the surface is given up, nothing is wrong in the frame, and the fault is declared to stay. counts:
+    something is wrong in the frame and, with several instants a frame, also in the one before and after it.
     """
     c, k = types.config, types.frame_index - 1
     returns = c.returns_lagged and types.frame_index > 0
     for s, srf in enumerate(types.surface):
         judged = srf.judged
         rests = c.abrupt and srf.accommodation.mode == GIVE_UP and not judged.anomalous
-        judges = judged.anomalous and (c.single_instant or (srf.earlier.anomalous and srf.last.anomalous))
+        counts = judged.anomalous and (c.single_instant or (srf.earlier.anomalous and srf.last.anomalous))
         for h in range(N_TYPES):
-            see_frame(h, c, srf, h, k, not (rests or judges))
+            see_frame(h, c, srf, h, k, not (rests or counts))
             if returns and HOLDS[h]:
                 lo, hi = deflection_range(h, c, srf, h, k if c.single_instant else k - 1)
                 release.begin_release(c, srf, h, lo, hi, STOP_SIDE[h])
         if rests:
             count_rest(types, s)
-        if judges:
+        if counts:
             count_anomaly(srf)
             judge_types(c, srf, k)
         # The judgement needs positions at the beginning of the judged frame; from here on those at its end.

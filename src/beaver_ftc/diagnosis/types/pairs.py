@@ -62,8 +62,8 @@ def locate_one(srf, eff, eff_other, nu, nu_max):
         p - u = (nu_L N - nu_N L) / det +- (e_L |N| + e_N |L|) / |det|,    det = L1 N - N1 L
 
     nu_L, nu_N         rad/s2            innovation in roll and yaw
-    L1, N1; L, N       rad/s2 per rad    effect in roll and yaw of this surface (eff); of the other
-    (eff_other) e_L, e_N           rad/s2            nu_max of the axis, and the tolerances r of both effects
+    L1, N1; L, N       rad/s2 per rad    effect in roll and yaw: of this surface, eff; of the other, eff_other
+    e_L, e_N           rad/s2            nu_max of the axis, and the tolerances r of both effects
     """
     L1, N1 = eff.Z[ROLL], eff.Z[YAW]
     L, N = eff_other.Z[ROLL], eff_other.Z[YAW]

@@ -300,8 +300,8 @@ def demand(control, prediction, measured):
 
         demand = xm' + Kp (xm - x+) - f - d,    hold = -f - d
 
-    xm: `target`, at the instant from which the command acts; xm' = (after - target) / dt, with xm a frame
-    later, `after`; x+: `memory.ahead`.
+    xm, xm_after: at the instant from which the command acts, and a frame later (`targets`); xm' = (xm_after -
+    xm) / dt; x+: `memory.ahead`.
     """
     law, output = control.rejecting, control.surfaces.output
     config, memory, means = law.config, law.memory, prediction.means
@@ -315,10 +315,10 @@ def demand(control, prediction, measured):
     for i in range(3):
         d = law.observer.disturbance[i]
         look_ahead(law, output, i, prediction.f, prediction.G, prediction.u)
-        target, after = targets(control.reference, i, config.share)
-        feedback = memory.Kp[i] * (target - memory.ahead[i])
+        xm, xm_after = targets(control.reference, i, config.share)
+        feedback = memory.Kp[i] * (xm - memory.ahead[i])
         hold = -prediction.f[i] - d
-        allocation.set_demand(control.axes, i, (after - target) / config.dt + feedback + hold, hold, d)
+        allocation.set_demand(control.axes, i, (xm_after - xm) / config.dt + feedback + hold, hold, d)
 
 
 @kernel

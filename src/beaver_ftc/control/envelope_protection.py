@@ -82,23 +82,23 @@ def limit_airspeed_to_fly(autopilot, layout, surfaces, u, unexplained, y, t):
 
     u (n,) rad: where the surfaces are. unexplained: d / G, rad.
     """
-    hold, e, f = autopilot.holding, layout.main[PITCH], layout.stand_in
-    hold.fastest, hold.slowest = np.inf, 0.0
+    holding, e, f = autopilot.holding, layout.main[PITCH], layout.stand_in
+    holding.fastest, holding.slowest = np.inf, 0.0
     effectiveness = surfaces.output.effectiveness
     E = effectiveness[e]
     healthy = E >= 1.0 and (f < 0 or effectiveness[f] >= 1.0)
-    if healthy or not hold.has_table:
-        hold.n_averaged_frames = 0
+    if healthy or not holding.has_table:
+        holding.n_averaged_frames = 0
     else:
-        average_acting_elevator(hold, autopilot.dt, surfaces.output.offset[e], E * u[e], unexplained)
-        if hold.n_averaged_frames * autopilot.dt > HOLD_SETTLED_S:
-            find_airspeeds_that_can_be_held(hold, layout, surfaces, y)
+        average_acting_elevator(holding, autopilot.dt, surfaces.output.offset[e], E * u[e], unexplained)
+        if holding.n_averaged_frames * autopilot.dt > HOLD_SETTLED_S:
+            find_airspeeds_that_can_be_held(holding, layout, surfaces, y)
     approach_airspeed_to_fly(autopilot)
     record_limits_in_force(autopilot, layout.main, effectiveness, t)
 
 
 @kernel
-def average_acting_elevator(hold, dt, offset, commanded, unexplained):
+def average_acting_elevator(holding, dt, offset, commanded, unexplained):
     """Average the acting elevator and its commanded part E u, rad, over ACTING_S:
 
         acting = offset + commanded + unexplained
@@ -107,14 +107,14 @@ def average_acting_elevator(hold, dt, offset, commanded, unexplained):
     n: averaged frames, so that at first all frames count alike. All in rad.
     """
     acting = offset + commanded + unexplained
-    hold.n_averaged_frames += 1
-    weight = max(dt / ACTING_S, 1.0 / hold.n_averaged_frames)
-    hold.mean_acting_elevator += weight * (acting - hold.mean_acting_elevator)
-    hold.mean_commanded_elevator += weight * (commanded - hold.mean_commanded_elevator)
+    holding.n_averaged_frames += 1
+    weight = max(dt / ACTING_S, 1.0 / holding.n_averaged_frames)
+    holding.mean_acting_elevator += weight * (acting - holding.mean_acting_elevator)
+    holding.mean_commanded_elevator += weight * (commanded - holding.mean_commanded_elevator)
 
 
 @kernel
-def find_airspeeds_that_can_be_held(hold, layout, surfaces, y):
+def find_airspeeds_that_can_be_held(holding, layout, surfaces, y):
     """Fill the fastest and the slowest airspeed that can be held, m/s.
 
     The flap may stand at either end of its travel, less the reserve, and the acting elevator at
@@ -127,18 +127,18 @@ def find_airspeeds_that_can_be_held(hold, layout, surfaces, y):
     """
     e, f = layout.main[PITCH], layout.stand_in
     E, E_flap = surfaces.output.effectiveness[e], surfaces.output.effectiveness[f]
-    fixed = hold.mean_acting_elevator - hold.mean_commanded_elevator
+    fixed = holding.mean_acting_elevator - holding.mean_commanded_elevator
     least, greatest = fixed + E * layout.low[e], fixed + E * layout.high[e]
-    up, down = layout.low[f] + hold.flap_reserve, layout.high[f] - hold.flap_reserve
+    up, down = layout.low[f] + holding.flap_reserve, layout.high[f] - holding.flap_reserve
     if E_flap < surfaces.config.least_effectiveness:
         up = down = within_stops(layout, f, surfaces.output.offset[f])
     rho = 2.0 * y[QDYN] / y[AIRSPEED] ** 2
-    hold.fastest = np.sqrt(2.0 * dynamic_pressure_limit(hold, up, greatest, FASTEST) / rho)
-    hold.slowest = np.sqrt(2.0 * dynamic_pressure_limit(hold, down, least, SLOWEST) / rho)
+    holding.fastest = np.sqrt(2.0 * dynamic_pressure_limit(holding, up, greatest, FASTEST) / rho)
+    holding.slowest = np.sqrt(2.0 * dynamic_pressure_limit(holding, down, least, SLOWEST) / rho)
 
 
 @kernel
-def dynamic_pressure_limit(hold, flap, elevator, limit):
+def dynamic_pressure_limit(holding, flap, elevator, limit):
     """The dynamic pressure, Pa, at which level flight with this flap takes this elevator, rad: linear between
     the points of the table, whose elevator is taken to rise with dynamic pressure.
 
@@ -147,31 +147,31 @@ def dynamic_pressure_limit(hold, flap, elevator, limit):
         from a later point on                    between two points         the same
         nowhere                                  infinite                   the last point
     """
-    before = between(flap, N_FLAP, hold.flap, row_of(hold.elevator, 0))
+    before = between(flap, N_FLAP, holding.flap, row_of(holding.elevator, 0))
     if before > elevator:
-        return hold.qdyn[0] if limit == FASTEST else 0.0
+        return holding.qdyn[0] if limit == FASTEST else 0.0
     for j in range(1, N_QDYN):
-        after = between(flap, N_FLAP, hold.flap, row_of(hold.elevator, j))
+        after = between(flap, N_FLAP, holding.flap, row_of(holding.elevator, j))
         if after > elevator:
             part = (elevator - before) / (after - before)
-            return hold.qdyn[j - 1] + part * (hold.qdyn[j] - hold.qdyn[j - 1])
+            return holding.qdyn[j - 1] + part * (holding.qdyn[j] - holding.qdyn[j - 1])
         before = after
-    return np.inf if limit == FASTEST else hold.qdyn[N_QDYN - 1]
+    return np.inf if limit == FASTEST else holding.qdyn[N_QDYN - 1]
 
 
 @kernel
 def approach_airspeed_to_fly(autopilot):
     """Move the airspeed to fly towards the nearest to the command that can be held, at most at
     max_airspeed_rate_mps2, so without a bump. Without a limit, it is the command."""
-    hold, command = autopilot.holding, autopilot.command[SPEED]
-    target = min(max(command, hold.slowest), hold.fastest)
-    if target == command and not hold.limits_airspeed:
+    holding, command = autopilot.holding, autopilot.command[SPEED]
+    target = min(max(command, holding.slowest), holding.fastest)
+    if target == command and not holding.limits_airspeed:
         autopilot.airspeed_to_fly, autopilot.airspeed_to_fly_rate = command, autopilot.command_rate[SPEED]
         return
-    step = clamp(target - autopilot.airspeed_to_fly, hold.max_airspeed_rate_mps2 * autopilot.dt)
+    step = clamp(target - autopilot.airspeed_to_fly, holding.max_airspeed_rate_mps2 * autopilot.dt)
     autopilot.airspeed_to_fly += step
     autopilot.airspeed_to_fly_rate = step / autopilot.dt
-    hold.limits_airspeed = autopilot.airspeed_to_fly != command
+    holding.limits_airspeed = autopilot.airspeed_to_fly != command
 
 
 @kernel
@@ -179,23 +179,25 @@ def record_limits_in_force(autopilot, main, effectiveness, t):
     """Record which limits are in force at t s: those of the airspeed if they change the command by more than
     NOTED_MPS, and that of the bank if ailerons or rudder have lost effectiveness. main (3,): the surface that
     leads each axis."""
-    hold, command = autopilot.holding, autopilot.command[SPEED]
+    holding, command = autopilot.holding, autopilot.command[SPEED]
     if autopilot.is_commanded[SPEED]:
-        record_limit(hold, FASTEST, hold.fastest, hold.fastest < command - NOTED_MPS, t)
-        record_limit(hold, SLOWEST, hold.slowest, hold.slowest > command + NOTED_MPS, t)
+        record_limit(holding, FASTEST, holding.fastest, holding.fastest < command - NOTED_MPS, t)
+        record_limit(holding, SLOWEST, holding.slowest, holding.slowest > command + NOTED_MPS, t)
     if effectiveness[main[ROLL]] < 1.0 or effectiveness[main[YAW]] < 1.0:
-        hold.bank += autopilot.dt / ACTING_S * (autopilot.bank_limit - hold.bank)
-        record_limit(hold, BANK_LIMIT, hold.bank, hold.bank < autopilot.max_healthy_bank - NOTED_RAD, t)
+        holding.bank += autopilot.dt / ACTING_S * (autopilot.bank_limit - holding.bank)
+        record_limit(
+            holding, BANK_LIMIT, holding.bank, holding.bank < autopilot.max_healthy_bank - NOTED_RAD, t
+        )
 
 
 @kernel
-def record_limit(hold, kind, value, in_force, t):
+def record_limit(holding, kind, value, in_force, t):
     """Record whether a limit is in force at t s and, if so, its value, and t if it is the first time."""
-    hold.in_force[kind] = in_force
+    holding.in_force[kind] = in_force
     if in_force:
-        if hold.from_s[kind] < 0.0:
-            hold.from_s[kind] = t
-        hold.value[kind] = value
+        if holding.from_s[kind] < 0.0:
+            holding.from_s[kind] = t
+        holding.value[kind] = value
 
 
 def set_up_level_flight_table(holding: np.void, layout: np.void, declared: Declared) -> None:

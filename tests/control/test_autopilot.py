@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.control.autopilot import AUTOPILOT, GAINS, set_body_rates
+from beaver_ftc.control.autopilot import set_body_rates
+from beaver_ftc.control.autopilot_setup import AUTOPILOT, GAINS
 from beaver_ftc.control.laws.loop_design import margins
 from beaver_ftc.control.profile import BANK
 from beaver_ftc.loop.loop import Loop, fly

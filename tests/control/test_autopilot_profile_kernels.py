@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.control.autopilot import AUTOPILOT
+from beaver_ftc.control.autopilot_setup import AUTOPILOT
 from beaver_ftc.control.profile import ALTITUDE, BANK, HEADING, SPEED, advance_commands
 
 DT = 0.1

@@ -1,5 +1,8 @@
-"""Fill the autopilot's record before the flight, from what the scenario declares and what the aircraft's file
-says."""
+"""The autopilot's record, and how it is filled before the flight, from the declaration of the scenario and
+the aircraft's file.
+
+The loops are in autopilot.py, whose module docstring has the letters.
+"""
 
 from math import inf, radians
 
@@ -7,12 +10,77 @@ import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.aircraft.aircraft import GRAVITY_MPS2, THRUST_TERM
-from beaver_ftc.compiled import fill
-from beaver_ftc.control.autopilot import GAINS
-from beaver_ftc.control.envelope_protection import MOST_BANK_DEG, set_up_level_flight_table
-from beaver_ftc.control.profile import NOT_JUDGED, set_up_profile
-from beaver_ftc.control.thrust import set_up_engine
+from beaver_ftc.compiled import fill, record
+from beaver_ftc.control.envelope_protection import HOLDING, MOST_BANK_DEG, set_up_level_flight_table
+from beaver_ftc.control.profile import MAX_LEGS, N_CHANNELS, NOT_JUDGED, set_up_profile
+from beaver_ftc.control.thrust import ENGINE, set_up_engine
 from beaver_ftc.scenario.declared import Declared
+
+# Gains of the loops: K, 1/s, and K_i, 1/s2, whose name ends with `_i`; times, s; and bounds of the demands.
+# The attitude loops are a fifth as fast as the inner loops, and the path loop is a quarter as fast as these.
+# Gusts set the gains, not comfort.
+GAINS = {
+    "altitude": 0.8, "altitude_i": 0.04, "attitude": 3.0, "speed": 0.3, "speed_i": 0.015,
+    "bank": 1.0, "bank_i": 0.2, "heading": 0.25, "heading_i": 0.004,
+    "sideslip": 0.5,  # 1/s, of the yaw damper: yaw rate per sideslip
+    "alpha_s": 2.0, "airspeed_s": 3.0,  # s, smoothing against noise and gusts
+    "jammed_s": 1.0,  # s, time constant with which rolling is handed to the rudder
+    "authority_s": 1.0,  # s: a rate is demanded only if it can be reached, and ended, within this time
+    "bank_s": 6.0,  # s: a bank is demanded only if it can be left within this time
+    "spare_mps": 2.0,  # m/s: with more error of the airspeed, the path gives way
+    "path_per_mps": 0.02,  # rad per m/s: how much it gives way
+    "loose": 0.4,  # factor on the heading loop when nothing acts in yaw: the turn then follows slowly
+    "protection": 2.0,  # 1/s: how fast the angle of attack may close on its limit
+}  # fmt: skip
+GAIN = record(**dict.fromkeys(GAINS, float))
+
+AUTOPILOT = record(
+    enabled=int,  # whether the scenario has a profile
+    flying=int,  # whether the autopilot has taken over
+    dt=float,  # s, length of a frame
+    # Profile (profile.py), in SI and rad, by channel: its legs. A leg whose value is NaN keeps the command.
+    n_legs=(int, N_CHANNELS), next_leg_index=(int, N_CHANNELS),
+    leg_starts_at_s=(N_CHANNELS, MAX_LEGS), leg_value=(N_CHANNELS, MAX_LEGS),
+    leg_max_command_rate=(N_CHANNELS, MAX_LEGS),
+    is_commanded=(int, N_CHANNELS),  # whether a leg has begun, so that the channel is flown
+    # the value to which the leg takes the command; the command now; its largest rate, per second
+    goal=N_CHANNELS, command=N_CHANNELS, max_command_rate=N_CHANNELS,
+    command_rate=N_CHANNELS,  # rate of the command now, per second
+    changed_at_s=N_CHANNELS,  # when a leg last changed the goal
+    # Aircraft and engine
+    gravity=float,  # m/s2
+    thrust=2,  # acceleration by dpt, and by dpt^2 per rad of alpha, over qdyn, m/s2 per Pa
+    engine=ENGINE,  # table of thrust, where the slipstream does not give it
+    pitch_holds_airspeed=int,  # whether pitch, and not power, holds the airspeed
+    trim_power=float, low_power=float, high_power=float,  # setting in trim, and its range
+    climb_in_trim=float,  # gamma_trim, rad, with the engine as trimmed
+    dihedral=float,  # 1/m: roll rate per rad of sideslip and m/s of airspeed
+    full_power=float, allowed_power=float,  # the highest setting now; the highest that the rudder allows
+    dpt_cubed_held_by_sideslip=float,  # dpt^3 whose yawing moment the largest accepted sideslip holds
+    slowest_mps=float, steepest_alpha=float,  # least airspeed, m/s, and largest angle of attack, rad, to fly
+    max_healthy_rate=3, rate_limit=3,  # largest p, q, r to demand, rad/s: with all surfaces healthy, and now
+    max_healthy_bank=float, bank_limit=float,  # largest bank to demand, rad: the same
+    # Memory
+    alpha=float, airspeed=float,  # smoothed, rad and m/s
+    recent_airspeed_mps=float,  # averaged over RECENT_AIRSPEED_S
+    # integrals M: rad/s of turn rate, rad of path angle, m/s2 along the path, rad/s of bank rate
+    missing_turn_rate=float, missing_path_angle=float, missing_acceleration=float, missing_roll_rate=float,
+    roll_loss_share=float,  # share of roll that rudder and dihedral carry, 0 to 1
+    yaw_loss_share=float,  # 1: no surface acts in yaw; moves smoothly between 0 and 1
+    engines_alone_yaw_share=float,  # share of the last BY_POWER_S in which engines alone act in yaw
+    # Output
+    rates=3,  # p, q, r to fly, rad/s
+    gain=GAIN,  # configuration: GAINS, by autopilot_setup.py
+    sets_power=int, power_setting=float,  # whether the autopilot sets the engine now, and to what
+    power_airspeed=float,  # m/s, to hold while power stands in for a lost pitch
+    airspeed_to_fly=float, airspeed_to_fly_rate=float,  # m/s; its rate of change, m/s2
+    holding=HOLDING,
+    # Deviations: averaged over MEAN_S, and the largest so far; from the command and, for the airspeed, also
+    # from the airspeed to fly. `largest_deviation` is NOT_JUDGED until the channel counts (profile.py).
+    mean_deviation=N_CHANNELS, mean_deviation_from_airspeed_to_fly=float,
+    largest_deviation_from_airspeed_to_fly=float, largest_deviation=N_CHANNELS,
+    largest_instant_airspeed_deviation=float,  # m/s, of the airspeed from what is commanded, at one instant
+)  # fmt: skip
 
 MOST_DEG_S = (12.0, 6.0, 10.0)  # largest rates p, q, r of a healthy aircraft: a transport's manoeuvres
 STEEPEST_ALPHA_DEG = 15.0  # angle of attack that no demand exceeds, within the limits of SPARE_ALPHA_DEG

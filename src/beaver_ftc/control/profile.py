@@ -2,7 +2,7 @@
 
 A *channel* c is one of these four signals, in m, m/s and rad. A leg begins at an instant and moves the
 command of its channel to a value, at most at its rate. The functions here write the fields of the autopilot's
-record (autopilot.py) that AUTOPILOT lists under "Profile" and "Deviations".
+record (autopilot_setup.py) that AUTOPILOT lists under "Profile" and "Deviations".
 """
 
 from math import inf, nan, radians

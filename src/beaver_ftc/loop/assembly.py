@@ -18,8 +18,7 @@ import numpy as np
 from beaver_ftc.compiled import record, sized
 from beaver_ftc.control import state as control
 from beaver_ftc.control.accommodation import SUPERVISOR
-from beaver_ftc.control.autopilot import AUTOPILOT
-from beaver_ftc.control.autopilot_setup import set_up_autopilot
+from beaver_ftc.control.autopilot_setup import AUTOPILOT, set_up_autopilot
 from beaver_ftc.control.profile import COLUMNS
 from beaver_ftc.design.model import anchor
 from beaver_ftc.diagnosis import model_prediction, schemes

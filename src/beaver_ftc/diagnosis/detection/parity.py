@@ -54,11 +54,12 @@ a force scores 0, and no other needs confirmation. A view never excludes a surfa
 
 Letters of the kernels, in addition to those of likelihood.py and rows.py:
 
-    m, col      direction of a view and g / |g|, (5,)
+    m, col      direction of a view, and g / |g|, (5,)
+    g, e        column of G that a view nulls, and the bound on its error (`rows.e_G`), rad/s2 per rad
     b, f        block of a view; record of a force; b.source: what is subtracted from its rates (rows.py);
                 from VANELESS on no vane is used
     L           acceleration per rad/s of the aircraft against the air, 1/s
-    cfg         configuration of the statistical tests
+    cfg         configuration of the statistical tests (TESTING_RECORD)
 
 parity_design.py fills the views from what a scenario declares.
 """

@@ -185,26 +185,26 @@ def add_constants(w, noise, rows, err, model, meas, u):
         return
     evaluate(tab, meas.x, y)
     regressors(tab, tab.power, u, noise.zC)
-    first = n - N_INPUT_READINGS * noise.noisy  # of the readings
+    first_reading = n - N_INPUT_READINGS * noise.noisy  # column of the first reading
     for i in range(3):
         C[i, :n] = 0.0
         for k in range(tab.free_from[i], tab.surface_to[i]):
             C[i, k] = noise.zC[k]
-    for j in range(n - first):
+    for j in range(n - first_reading):
         fill_signal_slopes(tab, err, y, j, noise.ds)
         directional(tab, tab.signal, tab.power, noise.ds, noise.dm)
         for i in range(3):
-            C[i, first + j] = whole_sum(tab, i, noise.dm, u)
+            C[i, first_reading + j] = whole_sum(tab, i, noise.dm, u)
             if j == QDYN:
-                C[i, first + j] += whole_sum(tab, i, tab.power, u) / y[QDYN]
+                C[i, first_reading + j] += whole_sum(tab, i, tab.power, u) / y[QDYN]
     accelerate(model, y, C[:, :n])
     for i in range(3):
         if noise.noisy:
             noise.Q[i] = noise.Q0[i]
         for c in range(n):
             rows.Z[c, i] += w * C[i, c]
-            if c >= first:
-                noise.Q[i] += (C[i, c] * noise.sigma[c - first]) ** 2
+            if c >= first_reading:
+                noise.Q[i] += (C[i, c] * noise.sigma[c - first_reading]) ** 2
 
 
 @kernel

@@ -1,7 +1,8 @@
 """Rotations of the sensor monitor: quaternions as pairs of complex numbers.
 
-q, p   z1 + z2 j = (z1, z2); an attitude turns body to level axes
-v      vector: its components x, y, z are (x i, y + z i)
+q, p   quaternion z1 + z2 j = (z1, z2), of length 1 if it is a turn; an attitude turns body axes to level axes
+v, w   vector: its components x, y, z are (x i, y + z i), so that it is the quaternion x i + y j + z k
+y      readings (N_SENSORS,), of which the angles phi, theta, psi count here, rad
 """
 
 import numpy as np

@@ -39,13 +39,6 @@ def quiet(**changes):
     return load_text(QUIET, folder=FOLDER).with_(changes)
 
 
-def test_it_has_its_own_surfaces_groups_and_leaders(trainer):
-    assert trainer.surfaces == ("aileron", "elevator", "rudder")
-    assert trainer.dominant_axis == (0, 1, 2)
-    assert trainer.primary == trainer.surfaces
-    assert trainer.signal_names == ("alpha", "beta", "ph", "qh", "rh")
-
-
 def test_it_is_trimmed_by_its_own_surfaces_and_engine(trainer):
     plant = Plant(100, aircraft=trainer)
     slow, fast = (trim(50.0, 1500.0, plant=plant, thrust_n=thrust) for thrust in (600.0, 1400.0))
@@ -97,6 +90,13 @@ def test_every_detector_names_its_elevator(scheme):
 def test_every_law_flies_it(law):
     flight = fly(quiet(**{"control.law": law}))
     assert flight.departure is None
+
+
+def test_a_weak_elevator_at_its_stop_stays_in_use():
+    fast = [{"square": {"amplitude_deg_s": 40, "frequency_hz": 0.25}}]
+    log = bf.fly(quiet(**{"faults": [LOST | {"magnitude": 0.8}], "reference.q": fast})).log
+    assert log.elevator_saturated.any()
+    assert log.elevator_effectiveness_used.min() > 0.1
 
 
 def test_a_result_folder_flies_it_again(tmp_path):

@@ -24,7 +24,7 @@ STOP_RECOVERY = 1.5
 @kernel
 def is_replaced(layout, s):
     """Whether another surface can take the place of surface s."""
-    return s == layout.main[PITCH] or s == layout.stand_in
+    return layout.stand_in >= 0 and (s == layout.main[PITCH] or s == layout.stand_in)
 
 
 @kernel

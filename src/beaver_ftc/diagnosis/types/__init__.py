@@ -17,7 +17,8 @@ one at some time.
     rate limit      p moves to u only      at the slowest declared rate or faster
     growing bias    p = u + b              b of one sign and never smaller (incipient)
 
-A frame that eta alone explains gives no information, so a fault may be intermittent. The promise: the type of
+A frame that eta alone explains gives no information, so a fault may be intermittent. The exception is a
+surface that was given up, if faults are declared to stay (`examination.count_rest`). The promise: the type of
 the true fault, if its parameter is constant while it is there, is never excluded, and so no other type is
 named. Types that cannot be distinguished stay candidates.
 
@@ -26,7 +27,7 @@ This file says what is in a row (`FaultType`) and has two parts of a surface's r
 
 - Feasible sets: the set (low, high) of each type's parameter; low > high is the empty set. A type is excluded
   once its set is empty, and stays excluded until the surface's diagnosis restarts.
-- Observations: where the surface was, if it alone is at fault, in three frames or blocks:
+- Observations: where the surface was, if it alone is at fault (or by pairs.py), in three frames or blocks:
   `last` is of the elapsed frame, `judged` of the one before it, `earlier` of the one before that; rad.
 
 registry.py reads the rows into arrays, and records.py has the records. In each frame examination.py finds
@@ -36,7 +37,7 @@ modes.py what the law does about it, and findings.py puts it in words; they name
     s, srf          surface, and its record (`records.surface_types_dtype`)
     h               type: its number, the same in every array over types
     k               judged frame, the one before the elapsed
-    u, p            command and deflection of the surface, rad; u is where a healthy one is
+    u, p            deflection, rad: u of a healthy surface under the same command, p of this one
     lo, hi          interval, rad
     nu, nu_max (3,) innovation and its bound without a fault, rad/s2
     c, M            TYPES_CONFIG_RECORD of records.py, memory of a type
@@ -72,7 +73,7 @@ def reachable_range(c, srf, h, k):
 
 
 class DeflectionRelation(NamedTuple):
-    """The deflection p, rad, of a surface under a type, by its command u, rad, and one parameter theta:
+    """The deflection p, rad, of a surface under a type, by u, rad, of a healthy one, and one parameter theta:
 
         p = command_gain u + theta         theta in rad
         p = (command_gain + theta) u       if theta_is_share: theta without unit
@@ -104,7 +105,7 @@ class FaultType:
     consistent_interval(c, srf, h, k)
                             the parameters (low, high) that explain the judged frame, in which something was
                             wrong; UNLIMITED_SET if every one does, EMPTY_SET (low > high) excludes the
-                            type
+                            type. Not of a type that `holds_surface`
     parameter_range(srf, h)
                             the parameters (low, high) that there are; unlimited if left out
     deflection_range(c, srf, h, k)
@@ -114,7 +115,8 @@ class FaultType:
                             a record of its own, found at `srf.<memory_record_name>`
     reset_memory(srf, h)    its memory is reset: nothing is known yet
     see_frame(c, srf, h, k, skipped)
-                            called for every frame, before it is judged; skipped: it is not judged
+                            called for every frame, before it is judged; skipped: it is neither judged nor
+                            one in which the surface rests
 
     The evidence that a verdict needs:
 
@@ -127,9 +129,11 @@ class FaultType:
                             which the surface stands)
     wait_half_cycles        half-cycles of evidence that a fault on another surface needs while this type is
                             left here
-    follows_command         whether the deflection error depends on the command. While a type that does not
-                            is left on one surface, no other surface is isolated in its place
-    can_look_like           names of types that this one can look like: they are not named while it is left
+    follows_command         of a type that is not constant: false if its deflection error may stay constant
+                            under any command. Such an error looks like a constant fault of another surface:
+                            while the type is left, no other surface is isolated in its place
+    can_look_like           names of types that this one, not constant, can look like: they are not named
+                            while it is left, unless `motion_rules_out` it
     motion_rules_out(srf, h, stop)
                             kernel: whether the surface has moved as this type cannot, towards the stop
                             of that direction (0: of a type without one)
@@ -143,9 +147,9 @@ class FaultType:
     end_type                name of the type that it becomes at the end of its range: where both are left, the
                             modes of that one serve this one too
     deflection_error(srf, h)
-                            kernel: how far the surface is off its command, rad; not finite if not known
+                            kernel: p - u, rad; not finite if not known
     deflection_error_precedence
-                            of the types left, the one with the least number gives the deflection error
+                            of the types left that have one, the least number gives the deflection error
 
     What shows from outside that it is excluded, and by which deflections it differs from another:
 
@@ -276,10 +280,10 @@ def observe_surface(c, srf, fie, m, nu, nu_max, eff):
 
         |nu - G (p - u)| <= nu_max + r        on every axis; over a block on axis m alone
 
-    from the innovation nu = eta + G (p - u) and |eta| <= nu_max, (3,) rad/s2. m: the axis on which the
-    surface has most effect; eff: Z = G, rad/s2 per rad, h = -G u, rad/s2, tolerance r, rad/s2; fie: the
-    estimator of its position. Over a block the axes weigh a varying position differently, so that they need
-    not agree on its mean.
+    from the innovation nu = eta + G (p - u) and |eta| <= nu_max, (3,) rad/s2, within reach. m: the axis on
+    which the surface has most effect; eff: Z = G, rad/s2 per rad, h = -G u, rad/s2, tolerance r, rad/s2;
+    fie: the estimator of its position. Over a block the axes weigh a varying position differently, so that
+    they need not agree on its mean.
     """
     last, cmd = srf.last, srf.commands
     last.u = -eff.h[m] / eff.Z[m]
@@ -300,7 +304,7 @@ def mark_stops(srf, width):
 
 @kernel
 def observe_error(srf, e, tol):
-    """Fill `last` of a surface that was off its command by e +- tol, rad:
+    """Fill `last`, but for u and kappa, of a surface with p - u = e +- tol, rad:
 
         p in [u + e - tol, u + e + tol] within its reach,    anomalous if |e| > tol
 

@@ -10,7 +10,7 @@ bound
 
     mean eta_bar + (nbar[k] + nbar[k+N]) / (N dt)
 
-which gives the mean position of the surface, weighted by its effectiveness G, whose sign stays. The weighted
+It gives the mean position of the surface, weighted by its effectiveness G, whose sign stays. The weighted
 mean of a constant position, offset or effectiveness is exact; that of a varying one lies between its
 extremes. To the types a block is like a frame of several JSBSim steps: a block next to a healthy one is
 skipped.
@@ -72,7 +72,7 @@ def restart_surface(srf):
 @kernel
 def record_commands(types, commands, ext):
     """Add a frame to the record of the commands (n,) rad. With the first frame of a block, the record moves
-    on by a block: index 1 is then the block before.
+    on by a block: index 1 is then the block before. `extend_block` counts the frames of a block.
 
     cmd: command of a surface, limited by its stops, rad. ext: of a `model_prediction.frame_means_dtype`: the
     extremes, within the frame, of u, where a healthy surface was, rad, and of G, rad/s2 per rad.
@@ -122,7 +122,7 @@ def count_anomaly(srf):
 def judge_types(c, srf, k):
     """Test every type of one surface with the judged frame, in which something was wrong."""
     ev, judged = srf.evidence, srf.judged
-    if judged.lo > judged.hi:
+    if judged.lo > judged.hi:  # no position explains the frame: this refutes the surface, and no single type
         return
     if ev.k_first < 0:
         (ev.k_first, ev.first_lo, ev.first_hi) = (k, judged.lo, judged.hi)
@@ -138,12 +138,13 @@ def judge_frame(types):
     """Judge the frame before the elapsed one, k, of each surface in these steps:
 
         1  Every type sees the frame: its memory widens before it is compared.
-        2  A type that holds the surface may release it. It takes the sets as they were before this frame is
-           judged, and where the type holds the surface as the release begins: in frame k if a frame has one
-           instant, else in frame k - 1.
+        2  If a repaired surface returns late, a type that holds the surface may release it. It takes the sets
+           as they were before this frame is judged, and where the type holds the surface as the release
+           begins: in frame k if a frame has one instant, else in frame k - 1.
         3  rests: `count_rest`. counts: count the anomaly, and test every type with the releases of step 2.
         4  Returns after a release that step 3 has left move on to the end of the frame.
-        5  A frame in which a stop may hide a swing restarts `n_unhidden`.
+        5  A frame in which a stop may hide a swing restarts `n_unhidden`. If a surface with a larger number
+           rests, step 3 of that surface then still counts: `n_unhidden` is 1.
 
     rests: the surface is given up, nothing is wrong in the frame, and the fault is declared to stay. counts:
     something is wrong in the frame and, with several instants a frame, also in the one before and after it.
@@ -216,7 +217,7 @@ def count_rest(types, s):
         surface agrees (`agrees_at_rest`)             the frame counts as an anomaly of it
         and another surface, each may be the sole     it counts as an anomaly of the other: with one fault,
         one at fault                                  that rest is this fault's
-        and it has rested for more than half_frames   a fault that swings would have shown: types of
+        and has rested in more than half_frames       a fault that swings would have shown: types of
         (half of the slowest cycle)                   REST_EXCLUDES_TYPE are excluded, unless errors of the
                                                       surfaces' effects (has_eG) could hide the swing
     """
@@ -235,7 +236,8 @@ def count_rest(types, s):
 
 @kernel
 def agrees_at_rest(srf):
-    """Whether the judged frame agrees with where the surface is known to stand."""
+    """Whether the judged frame agrees with where the surface stands: with the set of each type whose
+    parameter is that position."""
     for h in range(N_TYPES):
         outside = srf.judged.lo > srf.sets.high[h] or srf.judged.hi < srf.sets.low[h]
         if REST[h] == REST_POSITION_IS_PARAMETER and outside:

@@ -45,7 +45,8 @@ def _find_pair(fdi: np.void, names: Sequence[str]) -> FindingDict:
         none                 unanticipated      unanticipated                 the open planes
         none                 another            candidates of open planes     the open planes
 
-    An open plane has an alarm and no isolated surface.
+    An open plane has an alarm and no isolated surface. A statistical alarm names no plane: it opens both,
+    while no surface is isolated.
     """
     status, alarms = fdi["types"]["surface"]["status"], fdi["types"]["pair"]["group_alarm"]
     estimator = fdi["verdict"]["isolated_estimator"]
@@ -54,7 +55,6 @@ def _find_pair(fdi: np.void, names: Sequence[str]) -> FindingDict:
     faults = [_finding_on_surface(fdi, s, int(status["fault_type"][s]), names) for s in isolated]
     groups = [np.flatnonzero(fdi["layout"]["group"] == group).tolist() for group in range(len(alarms))]
     if not alarms.any() and not faults and estimator == NOT_ISOLATED:
-        # A statistical alarm names no plane: while no surface is isolated, the fault may be in any of them
         alarms = np.ones_like(alarms)
     undecided = [
         {**NO_FINDINGS, "candidates": tuple(_candidate_texts(fdi, members, names))}

@@ -52,9 +52,8 @@ def choose_mode(srf):
         varying types alone  the first of SCALE_COMMAND, WAIT_FOR_SURFACE, GIVE_UP that one of them has
         otherwise            SUBTRACT_OFFSET
 
-    SUBTRACT_OFFSET subtracts the deflection error of the last frame. It serves a type of another mode
-    meanwhile, and it moves the command. A surface that does not follow its command then shows this in the
-    next frame.
+    SUBTRACT_OFFSET subtracts the `deflection_error`. It serves a type of another mode meanwhile, and it moves
+    the command. A surface that does not follow its command then shows this in the next frame.
     """
     if constant_remains(srf):
         for mode in (GIVE_UP, SCALE_COMMAND, WAIT_FOR_SURFACE):
@@ -84,12 +83,12 @@ def serves_constants(srf, mode):
 
 @kernel
 def presumed_surface(types, layout):
-    """The surface that the law acts on while no surface is isolated (of a pair: none of pitch), or
-    NO_SURFACE.
+    """The surface that the law acts on while no surface is isolated (with pairs: none of pitch, and there is
+    an alarm in pitch), or NO_SURFACE.
 
         the only one on which a constant type remains, or else
         single faults    the first surface of pitch that can be faulty
-        pairs            the main surface of pitch, once there is an alarm in pitch
+        pairs            the main surface of pitch
 
     The law acts before the surface is certain, because it can undo its action. It does not matter whether it
     presumes elevator or flap as long as both follow their commands: the moment is the same.
@@ -120,7 +119,8 @@ def clear_modes(surfs):
 @kernel
 def accommodate(types, layout):
     """Set the mode of each isolated or presumed surface whose fault has been silent for less than
-    MAX_SILENCE_S, and -1 for the others; return the lead and its mode.
+    MAX_SILENCE_S, and -1 for the others; return the lead and its mode. A presumed surface that cannot be
+    faulty has SUBTRACT_OFFSET.
 
     The lead is the first such surface, unless the main surface of pitch is one that another can replace
     (SCALE_COMMAND or GIVE_UP): it then leads.

@@ -198,7 +198,7 @@ def has_second(types):
 @kernel
 def begin_second_if_shown(types, layout):
     """Begin the diagnosis of a second pitch fault once no constant type on the first surface explains the
-    flight: the first gets its stored sets back, and the second starts with no knowledge."""
+    flight: the first gets its stored sets back, and its partner, if it has one, starts with no knowledge."""
     s1 = types.pair.first_pitch
     if s1 == NO_SURFACE or layout.partner[s1] < 0 or has_second(types):
         return
@@ -217,8 +217,8 @@ def begin_second_if_shown(types, layout):
 @kernel
 def dismiss_varying(c, srf):
     """Whether no varying type needs to be considered any more: a slow oscillation, a slow surface or a
-    growing bias would have shown by now. The constant type looks like none of them, none is hidden, and the
-    flight has been anomalous for half a cycle."""
+    growing bias would have shown by now. No growing bias (not in FOLLOWS_COMMAND) can look like the constant
+    type, no type is hidden, and the flight has been anomalous for half a cycle."""
     imitated = verdict.can_be_another(srf, verdict.sole_type(srf, CONSTANT), False)
     in_doubt = imitated or verdict.may_be_hidden(c, srf)
     long_enough = srf.evidence.n_anomalous >= c.half_frames

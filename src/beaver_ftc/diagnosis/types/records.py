@@ -54,16 +54,19 @@ FEASIBLE_SETS_RECORD = record(low=N_TYPES, high=N_TYPES, excluded=(int, N_TYPES)
 # Evidence, counted in blocks that are judged.
 EVIDENCE_RECORD = record(
     # blocks in which something was wrong, and blocks in which nothing was wrong, but a surface that was given
-    # up stayed where it rests: this is evidence too (`count_rest`)
+    # up (this one, or the other of two that may each be the only one at fault) stayed where it rests: this is
+    # evidence too (`count_rest`)
     n_anomalous=int,
     n_rest=int,  # of n_anomalous, the blocks in which this surface stayed where it rests
     n_unhidden=int,  # of n_anomalous, the blocks since a stop could last hide a deflection
-    k_first=int,  # the first block in which something was wrong, -1 for none
+    k_first=int,  # the first block in which something was wrong and a position explains it, -1 for none
     first_lo=float, first_hi=float,  # where the surface was in block k_first, rad
 )  # fmt: skip
 
 STATUS_RECORD = record(
-    may_be_sole=int,  # whether the surface may be the only one at fault
+    # whether the surface may be the only one at fault. With pairs: the only one in pitch, so 0 for surfaces
+    # of roll and yaw, and for all once a second fault has begun in pitch
+    may_be_sole=int,
     # what decides whether it can be at fault: BY_ESTIMATOR, DEDUCED_FAULTY or DEDUCED_HEALTHY (verdict.py)
     basis=int,
     is_isolated=int, isolated_at_s=float,
@@ -88,7 +91,7 @@ TYPES_CONFIG_RECORD = record(
     returns_lagged=int,  # whether a repaired surface returns with lag or rate limit
     half_frames=int,  # blocks in half a cycle of the slowest oscillation
     abrupt=int,  # whether a fault is declared to stay as it is
-    has_eG=int,  # whether errors of the surfaces' own terms are declared
+    has_eG=int,  # as that of `bound_dtype`: whether the surfaces' own terms have errors (fault_class: all)
     frames_per_block=int, block_duration_s=float, dt=float,
 )  # fmt: skip
 
@@ -98,7 +101,7 @@ FAULT_PAIR_RECORD = record(
     group_alarm=(int, 2),  # whether PITCH_GROUP and LATERAL_GROUP have an alarm
     lateral_outside=int,  # whether no deflections of ailerons and rudder within reach explain a frame
     first_pitch=int,  # surface of the first fault in pitch, -1 for none
-    n_unstored=int,  # frames since its `sets` exclude a type that its `first_sets` do not
+    n_unstored=int,  # frames since `sets` of first_pitch exclude a type that its `first_sets` do not
 )  # fmt: skip
 
 # The block that is being filled: frames so far; means of innovation and bound, rad/s2; nbar at its start,
@@ -128,7 +131,7 @@ def surface_types_dtype() -> np.dtype:
 
 @sized
 def fault_types_dtype(n: int) -> np.dtype:
-    """Faults of every type on n surfaces."""
+    """Faults of every type on n surfaces; frame_index: number of the elapsed block."""
     return record(
         config=TYPES_CONFIG_RECORD,
         frame_index=int,
@@ -141,7 +144,8 @@ def fault_types_dtype(n: int) -> np.dtype:
 def configure_types(
     types: np.void, layout: np.void, servos: np.void, declared: Declared, travel: np.ndarray
 ) -> None:
-    """Fill the configuration of the types and the actuator of each surface; travel (2, n): the stops, rad."""
+    """Fill the configuration of the types, but for has_eG (schemes/__init__.py), and the actuator of each
+    surface. layout: of `layout_dtype`; servos: the declared actuators; travel (2, n): the stops, rad."""
     fdi, dt = declared.fdi, 1.0 / declared.rate_hz
     n_block = ceil(BLOCK_DURATION_S / dt) if declared.sensors.declared.gyros_vary else 1
     assert n_block <= MAX_BLOCK  # because a scenario's rate is at most 1000 Hz

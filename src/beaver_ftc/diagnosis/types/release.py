@@ -1,9 +1,10 @@
 """Types that hold a surface somewhere, and let it go: does the judged frame agree with either?
 
 *Return.* A repaired surface returns from where it was held, by lag and rate limit of its actuator: for a
-while it is neither at fault nor where a healthy one would be. The step of the actuator p <- f(p) is known and
-rises with p. So the positions that past releases can have led to form an interval, whose ends are advanced
-exactly. A type that no longer holds the surface is excluded only if no such return explains the frame either.
+while it is neither at fault nor where a healthy one would be. The step of the actuator p <- f(p) rises with
+p, and the declared actuators bound it. So the positions that past releases can have led to form an interval,
+whose ends are advanced exactly. A type that no longer holds the surface is excluded only if no such return
+explains the frame either.
 
 *Two intervals.* There is one of earlier and one of later releases. Nothing is observed before the alarm, so a
 release may have happened before it. Each frame in which something is wrong excludes some releases. After a
@@ -89,8 +90,8 @@ def simulate_return(c, srf, p0, end, anywhere=False):
     """
     act = srf.actuator
     total, p, p_min, p_max = 0.0, p0, p0, p0
-    for k in range(c.frames_per_block):
-        u = srf.commands.history[1, k]
+    for frame in range(c.frames_per_block):
+        u = srf.commands.history[1, frame]
         for _ in range(c.n_substeps):
             total += p
             p_min, p_max = min(p_min, p), max(p_max, p)
@@ -113,7 +114,7 @@ def simulate_ends(c, srf, lo, hi, anywhere=False):
 @kernel
 def release_explains(c, srf, h):
     """Whether a release at an instant of the judged block, from where the type held the surface by then
-    (held_lo, held_hi), explains the block."""
+    (held_lo, held_hi), explains the block; false of a single frame."""
     lo, hi = srf.release.held_lo[h], srf.release.held_hi[h]
     if c.frames_per_block == 1 or lo > hi:
         return False
@@ -144,8 +145,8 @@ def narrow_return(c, srf, b, h):
 
         lo <- lo + max(judged.lo - low - tol, 0),    hi <- hi - max(high - tol - judged.hi, 0)
 
-    This is valid because the mean over the frame rises with where the return began, and by no more than that,
-    if the actuator is known. A return that has ended by now (`healthy`) explains nothing wrong.
+    The cut needs an actuator without declared errors: the mean over the frame then rises with where the
+    return began, and by no more than that. A return that has ended by now (`healthy`) explains nothing wrong.
     """
     judged, lo, hi = srf.judged, srf.release.back_lo[b, h], srf.release.back_hi[b, h]
     (low, high), tols, _ = simulate_ends(c, srf, lo, hi)
@@ -168,8 +169,8 @@ def held_set(c, srf, h, lo, hi):
         otherwise, and a return explains the frame   all; from now on the surface is released
         otherwise                                    none
 
-    A type holds the surface until it has released it. The returns are tested in any case, because those that
-    do not explain the frame must be forgotten.
+    A type holds the surface until it has released it. The returns, if there can be any, are tested in any
+    case, because those that do not explain the frame must be forgotten.
     """
     returns = c.returns_lagged and keep_returns(c, srf, h)
     released, judged = srf.release.released, srf.judged
@@ -184,25 +185,26 @@ def held_set(c, srf, h, lo, hi):
 @kernel
 def begin_release(c, srf, h, lo, hi, stop):
     """Add to the later releases one that may have happened as the judged frame began, or within the frame
-    before, if a frame has several instants. It begins where the type held the surface, (lo, hi), and where
-    the surface was seen. Within a frame the surface may have been further towards the stop (1 upper, -1
-    lower) to which the type runs, so that this end is not narrowed by what was seen.
+    before, if a frame has several instants; none once the type has released the surface. It begins where the
+    type held the surface, (lo, hi), and where the surface was seen. Within a frame the surface may have been
+    further towards the stop (1 upper, -1 lower) to which the type runs, so that this end is not narrowed by
+    what was seen.
 
     If the parameter is the position, and no earlier release is possible any more, the later ones become the
     earlier ones.
     """
-    rel, judged = srf.release, srf.judged if c.single_instant else srf.earlier
+    rel, seen = srf.release, srf.judged if c.single_instant else srf.earlier
     if is_position(srf, h) and not may_return(rel, EARLIER, h):
         for ends in (rel.back_lo, rel.back_hi, rel.set_lo, rel.set_hi):
             ends[EARLIER, h] = ends[LATER, h]
         forget_return(rel, LATER, h)
         rel.set_lo[LATER, h], rel.set_hi[LATER, h] = srf.sets.low[h], srf.sets.high[h]
     rel.held_lo[h], rel.held_hi[h] = EMPTY_SET
-    if max(lo, judged.lo) <= min(hi, judged.hi) and not rel.released[h]:
+    if max(lo, seen.lo) <= min(hi, seen.hi) and not rel.released[h]:
         if c.single_instant or stop != -1:
-            lo = max(lo, judged.lo)
+            lo = max(lo, seen.lo)
         if c.single_instant or stop != 1:
-            hi = min(hi, judged.hi)
+            hi = min(hi, seen.hi)
         rel.held_lo[h], rel.held_hi[h] = lo, hi
         widen_later(rel, h, lo, hi)
 
@@ -218,7 +220,8 @@ def widen_later(rel, h, lo, hi):
 def advance_returns(c, srf, h):
     """Carry the intervals of returns to the end of the judged frame. A surface that looks healthy in it may
     be held again; its set is then that from before the earliest return still possible. Hence the order of the
-    slots: what EARLIER puts replaces what LATER has put.
+    slots: what EARLIER puts replaces what LATER has put. A release within the judged block then joins the
+    later ones.
     """
     rel = srf.release
     for b in (LATER, EARLIER):

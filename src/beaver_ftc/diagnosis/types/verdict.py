@@ -153,7 +153,7 @@ def can_be_another(srf, apparent, with_dependent):
     """Whether what looks like the constant type `apparent` may be a varying type h: h remains, can look like
     a constant type j that remains and has the name of `apparent`, and the motion does not rule h out.
 
-    with_dependent: whether types that depend on the command (`FOLLOWS_COMMAND`) count as well.
+    with_dependent: whether types in FOLLOWS_COMMAND count as well.
     """
     for h in range(N_CONSTANT, N_TYPES):
         if apparent >= 0 and type_remains(srf, h) and (with_dependent or not FOLLOWS_COMMAND[h]):
@@ -166,8 +166,8 @@ def can_be_another(srf, apparent, with_dependent):
 
 @kernel
 def sole_surface(surfs, constant):
-    """The sole surface that can be at fault, NO_SURFACE or SEVERAL_SURFACES; with `constant`, only surfaces
-    on which a constant type remains count."""
+    """The sole surface that can be at fault, of those that `may_be_sole`; or NO_SURFACE or SEVERAL_SURFACES.
+    With `constant`, only surfaces on which a constant type remains count."""
     sole = NO_SURFACE
     for s, srf in enumerate(surfs):
         if srf.status.may_be_sole and can_be_faulty(srf) and (constant_remains(srf) or not constant):
@@ -202,10 +202,10 @@ def find_surface(types, layout):
 
 @kernel
 def others_dismissed(types, sole):
-    """Whether every surface other than `sole` can only have a fault that depends on its command, and there
-    have been enough anomalous frames to say so:
+    """Whether every surface other than `sole` can only have a fault whose deflection error cannot stay
+    constant (FOLLOWS_COMMAND), and there have been enough anomalous frames to say so:
 
-        n_anomalous >= half_frames max(1, WAIT_HALF_CYCLES of the types that remain on the others)
+        n_anomalous of `sole` >= half_frames max(1, WAIT_HALF_CYCLES of the types that remain on the others)
 
     A type that must show itself has had its time (`would_have_shown`). If errors of the surfaces' effects are
     declared (has_eG), a varying fault can hide in them, and every type of the others must be excluded.
@@ -231,9 +231,11 @@ def type_on_surface(c, srf):
     which it is not hidden; TYPE_UNDECIDED while more than one fits or one may yet show itself.
 
         errors of effects (has_eG)   the sole type, once it is shown
-        a constant type remains      the sole constant type, unless it can be another
-        no constant type remains     the sole varying type that need not show itself, unless another can look
-                                     like it; if there is none, the sole one that must and has
+        a constant type remains      the sole constant type, once those that must show would have, unless it
+                                     can be another
+        no constant type remains     the sole varying type that need not show itself, at the same time, unless
+                                     another can look like it; if there is none, the sole one that must and
+                                     has
     """
     if srf.evidence.n_anomalous < c.half_frames or may_be_hidden(c, srf):
         return TYPE_UNDECIDED

@@ -75,7 +75,7 @@ def consistent_interval(c, srf, h, k):
 
     up <- max(up, lo)    down <- min(down, hi)        (lo, hi): of `bias.consistent_interval`, not open
     EMPTY_SET if lo > hi, if up > 0 > down, or if the offset is smaller than it was:
-    hi < up after it grew upwards, lo > down after it grew downwards
+    hi < up after it grew upwards, lo > down after it grew downwards; a set that is open says nothing
     """
     lo, hi = bias.consistent_interval(c, srf, h, k)
     if lo <= hi:

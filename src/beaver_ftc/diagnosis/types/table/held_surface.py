@@ -6,8 +6,8 @@
                of a runaway takes it
 
 The three share one way of being judged: a row says where its type holds the surface (`deflection_range`), and
-release.py tests whether the judged frame agrees with this, or with a return after a release. Each kernel has
-the name of its type and of the slot that it fills. Symbols: types/__init__.py.
+release.py tests whether the judged frame agrees with this, or with a return after a release. Symbols:
+types/__init__.py.
 """
 
 import numpy as np
@@ -41,7 +41,7 @@ def stuck_range(c, srf, h, k):
 
 @kernel
 def stuck_error(srf, h):
-    """Middle of the interval of the jammed position minus the command, rad."""
+    """p - u, rad: p in the middle of the interval of the jammed position."""
     return set_middle(srf, h) - srf.last.u
 
 
@@ -59,7 +59,7 @@ def float_range(c, srf, h, k):
 
 @kernel
 def float_error(srf, h):
-    """Neutral position minus the command, rad."""
+    """p - u, rad: p at neutral."""
     return clip_travel(srf, 0.0) - srf.last.u
 
 
@@ -84,8 +84,9 @@ def runaway_distance(c, srf, k):
 
         d = rate T n,    n = k - k_first
 
-    rate rad/s: the slowest runaway; T s: duration of a block of frames. A block has the mean of its frames,
-    which the surface had reached by its end at the latest: of several frames a block, n is one less.
+    rate rad/s: the slowest runaway; T s: duration of a block of frames. A block shows the mean of its frames,
+    which lies between its first and its last position. From the mean of one block to that of another, a
+    surface has surely moved only in the n - 1 blocks between them: of several frames a block, n is one less.
     """
     n = k - srf.evidence.k_first
     if c.frames_per_block > 1:
@@ -127,6 +128,8 @@ TYPES = (
     FaultType(
         name="float", has_constant_parameter=True, sort_rank=3, holds_surface=True,
         deflection_range=float_range,
+        # While a surface floats, stuck and total loss remain too, and choose the mode. Float alone remains
+        # only for frames that a return after a repair explains: it has the mode of an open type.
         accommodation_mode=SUBTRACT_OFFSET, other_accommodation_modes=(GIVE_UP, SCALE_COMMAND),
         deflection_error=float_error,
         deflection_error_precedence=1,

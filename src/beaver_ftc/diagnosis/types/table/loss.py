@@ -41,8 +41,8 @@ def deflection_range(c, srf, h, k):
 def varying_interval(c, srf, h, k):
     """UNLIMITED_SET if some 1 + theta in [0, 1] explains the judged frame, else EMPTY_SET.
 
-    Over a block of frames in which the command changes its sign, the mean p may be any: an effectiveness that
-    varies within the block weighs both signs differently.
+    Over a block of frames in which u changes its sign, the mean p may be any: an effectiveness that varies
+    within the block weighs both signs differently.
     """
     lo, hi = consistent_interval(c, srf, h, k)
     changed = c.frames_per_block > 1 and srf.commands.u_min[1] < 0.0 < srf.commands.u_max[1]

@@ -25,9 +25,9 @@ def consistent_interval(c, srf, h, k):
         3  and intersected with where the surface was seen
 
     The order matters: step 1 compares with the bound before this frame's motion, and step 3 gives the bound
-    for the next frame. After a skipped frame, or on the other side, the bound restarts with what is seen. If
-    a frame has several JSBSim steps, the first still follows the command of the frame before
-    (`commands_of_frame`).
+    for the next frame. After a skipped frame, on the other side, or if the side is not certain (0), the bound
+    restarts with what is seen. If a frame has several JSBSim steps, the first still follows the command of
+    the frame before (`commands_of_frame`).
     """
     judged, M, side, away = srf.judged, srf.rate_limit, side_of_commands(c, srf), False
     if side == 0 or side != M.side or k != M.k_last + 1:

@@ -52,7 +52,7 @@ def conclusion_dtype(n: int) -> np.dtype:
     The fault:
     detected, detected_at_s, axis: whether there is an alarm, since when, on which axis
     isolated_estimator, isolated_at_s: estimator of the isolated fault, NOT_ISOLATED or UNANTICIPATED
-    fault_type, typed_at_s: number of its type, -1 if open
+    fault_type, typed_at_s: number of its type, -1 if open, and since when
     target, accommodation_mode: the surface on which the law acts, and how; -1 for none
     has_effectiveness, effectiveness (n,): of every surface, if a plug-in estimates it
 
@@ -134,7 +134,8 @@ def withdraw_conclusion(conclusion):
 @kernel
 def update_interval(conclusion, s, isolated, t, kind, reason):
     """Record at t s whether surface s is isolated, and its type `kind` (-1 if open). If the isolation ends
-    with this frame, store it with the reason; if it continues and its type ends, store the type.
+    with this frame, store it with the reason; if it continues and its type ends or changes, store the type
+    that it had.
     """
     isolated_since, old_type = conclusion.from_s[s], conclusion.isolated_type[s]
     if isolated and isolated_since < 0.0:
@@ -188,7 +189,7 @@ def assessment_dtype(n: int) -> np.dtype:
     diagnoses_all_types       whether faults of every type are diagnosed
     isolated_surface          -1 for none
     lags                      whether a surface follows its command late
-    accommodation_mode (n,)   -1 while open, or unless faults of every type are diagnosed
+    accommodation_mode (n,)   -1 if the law does not act on the surface, or if only losses are diagnosed
     effectiveness (n,)        0 to 1
     at_once (n,)              whether the law applies the effectiveness at once, not gradually
     offset, lag (n,)          rad
@@ -210,7 +211,7 @@ def assess_surfaces(out, cfg, conclusion, types, layout, fies, stat):
 
         a plug-in estimates effectiveness, after its alarm     the plug-in
         the fault types have set a mode for the surface        `assess_surface`
-        the surface is isolated by its loss estimator          `isolated_theta`
+        only losses are diagnosed, and that of it is isolated  `isolated_theta`
         otherwise                                              1, no offset, no lag
 
     The law has no target if no surface is isolated or accommodated, and no plug-in estimates effectiveness.
@@ -289,9 +290,11 @@ def weighs_statistics(stat, authority):
 
 @kernel
 def assess_unknown(out, cfg, conclusion, types, layout, stat, fdae, bound):
-    """Fill unknown_acceleration and pitch_undecided; fdae: of `FDAE_RECORD`; bound: what is declared.
+    """Fill unknown_acceleration, 0 before the alarm, and pitch_undecided; fdae: of `FDAE_RECORD`; bound: what
+    is declared.
 
-    The lag of a slow surface gives no unknown acceleration: to compensate it would wind up the command.
+    While the law waits for a slow surface, the unknown acceleration is 0: to compensate the lag would wind up
+    the command. pitch_undecided: half a cycle of anomalous frames (half_frames) is a long time.
     """
     unknown = out.unknown_acceleration
     unknown[:] = 0.0

@@ -15,8 +15,8 @@ Set membership: the parameters theta of a fault that are consistent with the inn
 
 nu, h, Z, nu_max and r are in rad/s2 (Z per unit of theta). One surface has one parameter, so one theta must
 be consistent on all axes. For a parameter that may change in any way, no test frame by frame is sharper. For
-a constant loss (`fdi.fault_profile: abrupt`) the sets of all frames since the alarm are intersected, unless a
-second fault may begin later (`fdi.pairs`).
+a constant loss (`fdi.fault_profile: abrupt`) the sets of all frames since the alarm are intersected if
+`sharpen.set_membership` is on, unless a second fault may begin later (`fdi.pairs`).
 
     nu, nu_max (3,) rad/s2        innovation of the frame and its bound without a fault (filters.py)
     x (3,) rad/s, F (3,) rad/s2   measured rates; mean of f + G u over the elapsed frame
@@ -48,7 +48,8 @@ ESTIMATOR_RECORD = record(
     theta_min=float, theta_max=float,  # the known set of theta
     # skip: whether an axis cannot exclude the fault; residual, its thresholds mu_lo and mu_hi: rad/s
     excluded=int, excluded_at_s=float, pending=int, skip=(int, 3), xhat=3, residual=3, mu_lo=3, mu_hi=3,
-    confirmed=int, weak=int, unlikely=int,  # by likelihood ratios; unlikely: in this frame
+    # by likelihood ratios; unlikely: in this frame, of a position by parity views
+    confirmed=int, weak=int, unlikely=int,
     # R_pos: as Omega, of the positive part of Z; B, B_lag: rad/s
     # effect: of the frame; mean_effect: of a block of frames (examination.py)
     Om=3, R_pos=3, B=3, B_lag=3, theta=3, P=3, effect=EFFECT_RECORD,
@@ -113,8 +114,8 @@ def narrow_sets(fie, nu, nu_max, shared):
 
         |eps + Om th - Om theta| <= B      |nu - h - theta Z| <= nu_max + r
 
-    The first holds for any course of the estimate th. Its theta are those from (eps + Om th - B) / Om to (eps
-    + Om th + B) / Om.
+    The first holds for any course of the estimate th. Its theta are those between (eps + Om th - B) / Om and
+    (eps + Om th + B) / Om. The second says nothing on an axis that is skipped.
     """
     for i in range(3):
         eps = fie.residual[i] + fie.Om[i] * fie.theta[i]
@@ -132,7 +133,7 @@ def narrow_sets(fie, nu, nu_max, shared):
 
 @kernel
 def start_estimators(iso, n, x):
-    """Start every estimator at the measured x, with the prior of theta; n (3,): of `n_gyro`.
+    """Start every estimator at the measured x, with the prior variance of theta; n (3,): of `n_gyro`.
 
     The set of a constant theta is the known one on every axis, or without limits if iso.config.free.
     """
@@ -184,7 +185,8 @@ def least_squares_step(fie, i, eps, forget):
 @kernel
 def joint_least_squares(fie, forget):
     """A least-squares step of one theta shared by the axes, axis after axis: eps_i = residual_i - Om_i total,
-    with the steps of the axes before in `total`. Returns the total. P is divided by `forget` once a frame."""
+    with the steps of the axes before in `total`. An axis with Z = 0 takes no step. Returns the total. P is
+    divided by `forget` once a frame."""
     total = 0.0
     for i in range(3):
         if i > 0:

@@ -7,15 +7,15 @@ estimators and their sets of theta.
 Every hypothesis is linear in one unknown parameter per axis, phi_i = h_i + theta_i Z_i:
 
     loss of effectiveness   h_i = 0         Z_i = G_is u_s      theta in [-1, 0]       [Zhang2005, eq. (4)]
-    position                h_i = -G_is u_s Z_i = G_is          theta in the travel
+    position                h_i = -G_is u_s Z_i = G_is          theta in the travel, extended to 0
 
 LOSS on aileron, elevator and rudder is the published class. POSITION_HYPOTHESIS states only that the surface
 does not follow its command. Its parameter, the deflection in rad, may change in any way, so it covers every
 fault of the surface. Both together are `fdi.fault_class: all`; types/ decides which type of fault it is.
 
 Likelihood ratios exclude a loss of the published class, or confirm it. A confirmed loss is never excluded by
-likelihood. A loss that only the end of an undetected earlier loss could explain is weakly excluded: it is not
-isolated.
+likelihood. A loss that only the end of an undetected earlier loss in pitch could explain is weakly excluded:
+it is not isolated.
 
 The sharpened tests (detection/filters.py, set membership in estimators.py) exclude as well, each by its own
 switch. The first test that fails excludes a fault.
@@ -85,8 +85,8 @@ def widen_error(fie, bound, nu, n_substeps):
 
         u = travel;   N_ROUNDS times:   u <- min(u, max |interval of the position with the tolerance at u|)
 
-    Every round gives a valid bound. The same holds for a map of the model's error, which is for healthy
-    surfaces (`level`).
+    Every round gives a valid bound; u is kept as u_far for the next frame. The same holds for a map of the
+    model's error, which is for healthy surfaces (`level`).
 
     If a frame has n substeps, the surface may at the first of them still be where it was a frame before. That
     is taken to be within u_far of neutral. For the mean position p the surface is then further out at the
@@ -219,6 +219,8 @@ def update_effects(iso, bank, bound, config, detected, G, Gu, e_Gu):
     update its reach in the bank, if a later stage reads them.
 
         loss of surface s   h = 0, Z = Gu_s        position   h = -Gu_s, Z = G_s        r = e_Gu_s
+
+    If errors of the surfaces' own terms are declared, `widen_error` adds them to r of a position.
     """
     if not (iso.config.reach or config.diagnoses_all_types or detected):
         return
@@ -299,9 +301,10 @@ def weigh_views(fie, views, cfg, forces, G):
 def update_likelihood(fie, cfg, blocks, iso, loss_of, abrupt, hidden):
     """Fill `unlikely` of estimator fie; update its `confirmed` and `weak`.
 
-    confirmed    stays once it is set: what contradicts a loss later may be its end
+    confirmed    tested if the loss is weakly excluded, or if faults may end; stays once it is set: what
+                 contradicts a loss later may be its end
     weak         at least 1 if the likelihood excludes the loss, with no end of a loss in pitch allowed for
-    unlikely     whether it excludes the loss also with such an end allowed for
+    unlikely     whether it excludes the loss also with such an end allowed for; 0 if confirmed
 
     hidden: a gust may hide an error of a vane from the sensor monitor. An exclusion may then be the effect of
     that error, so all estimators become weakly excluded. cfg, blocks: of the statistical detector; loss_of
@@ -310,7 +313,6 @@ def update_likelihood(fie, cfg, blocks, iso, loss_of, abrupt, hidden):
     fies, s = iso.estimator, fie.surface
     fie.unlikely = 0
     if not fie.confirmed and (fie.weak or not abrupt):
-        # a confirmed loss stays: what contradicts it later may be its end
         fie.confirmed = statistical.confirms_loss(cfg, blocks, fies, loss_of, s)
     if fie.confirmed or not statistical.excludes_loss(cfg, blocks, fies, loss_of, s, False, abrupt):
         return

@@ -16,9 +16,10 @@ from beaver_ftc.control.allocation import take_command
 CONFIG = record(
     incremental=int, K=(3, 6), A=(3, 3), B_inverse=(3, 3), trim_x=3, Kp=float, Ki=float, keep=float
 )
-# integral (3,) rad: of the tracking error. saturated: number of surfaces at a stop. Incremental inversion has
-# x_before (3,) rad/s, the rates of the frame before, and the filters of the measured acceleration and of the
-# surfaces' share of it, rad/s2. inherited (3,) rad/s2: what the law before attributed to no model.
+# integral (3,) rad: of the tracking error. saturated: number of surfaces whose command a stop cuts off.
+# begun: whether there is a frame before. Incremental inversion has x_before (3,) rad/s, the rates of that
+# frame, and the filters of the measured acceleration and of the surfaces' share of it, rad/s2. inherited (3,)
+# rad/s2: what the law before attributed to no model.
 MEMORY = record(
     integral=3, saturated=int, begun=int, x_before=3, rate_filter=(2, 3), surface_filter=(2, 3), inherited=3
 )

@@ -2,18 +2,22 @@
 
     u = u0 + G^-1 (nu - xdot0)          [Sieberling2010]
 
-    nu      (3,) rad/s2           demanded acceleration, by proportional-integral feedback
-    xdot0   (3,) rad/s2           filtered difference of the measured rates
-    u0      (n,) rad              positions of the surfaces that caused xdot0, through the same filter
-                                  [Smeur2016, sec. III]
-    G       (3, n) rad/s2 per rad effectiveness
+    u, u0   (3,) rad              surfaces that lead roll, pitch and yaw: command, and the positions that
+                                  caused xdot0
+    nu      (3,) rad/s2           demanded acceleration, xm' + Kp e + Ki int e, e = xm - x
+    xdot0   (3,) rad/s2           difference of the measured rates over the frame, over dt
+    G       (3, 3) rad/s2 per rad their effectiveness
 
 The positions are those of the model of the declared actuators, not the commands. G u0 of the elapsed frame is
-measured.contribution, so that
+the sum of the columns of these surfaces in measured.contribution, so that
 
     G u = nu - xdot0 + G u0
 
-Kernels fly it (kernel_law.py).
+xdot0 and G u0 pass the same filter, twice in series [Smeur2016, sec. III]:
+
+    y <- keep y + (1 - keep) input,    keep = exp(-filter_per_s dt)
+
+The kernels are in control/laws/compiled_rivals.py.
 """
 
 from collections.abc import Mapping

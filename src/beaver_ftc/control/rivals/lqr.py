@@ -7,7 +7,7 @@
     du   (3,) rad        surfaces that lead roll, pitch and yaw
 
 Weights by Bryson's rule: one over the square of an acceptable value (the options). The gains never change,
-which makes this law a reference for the others. Kernels fly it (kernel_law.py).
+which makes this law a reference for the others. The kernels are in control/laws/compiled_rivals.py.
 """
 
 from collections.abc import Mapping

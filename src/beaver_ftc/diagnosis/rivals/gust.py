@@ -1,9 +1,10 @@
 """The gusts that vanes measure, from signals that every plug-in receives: air data, attitude, accelerometers.
 
-    dw = L' v[k-1] + dt (L' f + g) - L' v[k]     change of the air's velocity, m/s, in level axes
+    dw = L'[k-1] v[k-1] + dt (L'[k-1] f[k-1] + g) - L'[k] v[k]     in frame k, by an Euler step
     tau q_g' + q_g = w_g' / V,  tau r_g' + r_g = v_g' / V     rotation of the air, rad/s [MIL-F-8785C, 3.7]
     tau = tau_trim V_trim / V     time constants, s, at the measured airspeed V, m/s
 
+    dw         m/s     change of the air's velocity, in level axes
     v          m/s     velocity relative to the air, in body axes, by airspeed and vanes
     f, g       m/s2    accelerometers, in body axes; gravity, in level axes
     L          (3, 3)  rotation from level to body axes
@@ -55,7 +56,7 @@ class VaneGust:
     def _noise(self, context: Context) -> np.ndarray:
         """Standard deviation (3,) rad/s2 of the effect, by the noise of a sample of each instrument.
 
-        Standard deviations, rad/s, of the change of q_g in a frame, by those of alpha, theta, V, phi and a_z:
+        Standard deviations, rad/s, that a sample of alpha, theta, V, phi and a_z gives q_g, by their noises:
 
             (hypot(alpha, theta) + 0.3 (V_noise / V + phi) + dt a_z / V) / tau_q
 
@@ -103,7 +104,7 @@ class VaneGust:
 
 
 def _level_axes(phi: float, theta: float) -> np.ndarray:
-    """L' (3, 3): a vector in body axes, times this, is one in level axes: ahead, right, down."""
+    """L' (3, 3): L' times a vector in body axes is the same in level axes: ahead, right, down."""
     L = np.empty((3, 3))
     plain(fill_rotation)(phi, theta, L)
     return L.T

@@ -56,7 +56,7 @@ def mix_states(
 
 def posterior_probabilities(predicted: np.ndarray, log_likelihoods: np.ndarray) -> np.ndarray:
     """Bayes' rule, mu_j ~ predicted_j exp(log_likelihoods_j), in logarithms so that nothing underflows; all
-    (M,). None is below _MIN_MODE_PROBABILITY."""
+    (M,). None is below _MIN_MODE_PROBABILITY before the last division by the sum."""
     log_mu = np.log(predicted) + log_likelihoods
     mu = np.exp(log_mu - log_mu.max())
     mu = np.maximum(mu / mu.sum(), _MIN_MODE_PROBABILITY)

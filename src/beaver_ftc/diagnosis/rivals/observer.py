@@ -7,8 +7,8 @@ The residual is that of the published detection estimator, but the threshold doe
 alarm a second residual starts from zero. The filtered effect of each surface is fitted to it by least squares
 over a fading window. The best fit names the fault; one window after the alarm the name is final.
 
-The declared errors of gyros, air and model have a known variance behind the filter, (rad/s)^2. The threshold
-is `alarm` times the root of their sum:
+Declared errors of gyros, air and model have a known variance behind the filter, (rad/s)^2. If any error is
+declared, the threshold is `alarm` times the root of their sum instead:
 
     gyro     white noise n, as n[k+1] - n[k]         2 sigma^2 / (1 + a)
     air      first order, r = exp(-dt / tau)         dt^2 sigma^2 (1 + a r) / ((1 - a^2) (1 - a r))

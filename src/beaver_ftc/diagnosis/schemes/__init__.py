@@ -123,8 +123,9 @@ def reason_of_withdrawal(fdi, s, isolated):
     PLUGIN_DECIDES      the scheme is a plug-in
     SURFACE_REFUTED     the estimator of the surface is excluded (of its position, if all types are
                         diagnosed, else of its loss)
-    TYPES_REFUTED       the stored types of the first fault in pitch are refuted, or no type of the name
-                        that it had remains
+    TYPES_REFUTED       all types are diagnosed, and the stored types of the first fault in pitch are
+                        refuted, or no type of the name that it had (any name, if the surface itself is no
+                        longer isolated) remains
     SEVERAL_POSSIBLE    otherwise
     """
     cfg, surf = fdi.config, fdi.types.surface[s]

@@ -7,7 +7,7 @@ The isolation depends on the fault class, and on the detectors whose exclusions 
 
     class        what excludes a fault                what is decided
     published    worst case, likelihoods, or either   the only remaining estimator: a loss of one surface
-    all          worst case, or parity views as well  the type of a fault on each surface, alone or in pairs
+    all          worst case, or parity views as well  the type of a fault on each surface, one or two faults
 
     fdi             record of `schemes.fdi_dtype`
     pred, meas      prediction of the design model, readings of the sensors
@@ -99,7 +99,7 @@ def weigh_position(fdi, j):
 
 @kernel
 def exclude_or_wait(fdi, fie, possible, t):
-    """Exclude the fault of estimator fie at t s, unless it is possible.
+    """Exclude the fault of estimator fie at t s, unless it is possible and no exclusion is pending.
 
     Where sensors are monitored, a fault that has been isolated is excluded a frame later: a broken gyro may
     have contradicted it, and the attitude reveals the gyro a frame late. While a gyro may be the cause of the
@@ -134,7 +134,9 @@ def isolate(fdi, meas, t, started):
 
 @apart
 def decide_type(fdi, t, started):
-    """Decide on which surface, or two of them, there is a fault, and of which type."""
+    """Examine the frame, in the first one of the isolation only with pairs or `reach`. Then decide on which
+    surface, or two of them, there is a fault, and of which type, unless a gyro may be the cause of the alarm.
+    """
     types, concluded, layout, bank = fdi.types, fdi.verdict, fdi.layout, fdi.bank
     fies, bound = fdi.isolation.estimator, fdi.bound
     verdict.record_exclusions(types.surface, layout, fies)
@@ -165,7 +167,7 @@ def record_orders(fdi, prediction):
 
 @apart(long_loops=True)
 def update_tests(fdi, prediction, measured, k, t):
-    """Test the innovation of the elapsed frame, which ends frame k at t s, for every hypothesis: in the
+    """Test the innovation of the elapsed frame, which ends at frame k, t s, for every hypothesis: in the
     blocks of the rates, against the attitude, and in the parity views."""
     stat, y, dt = fdi.statistical, measured.y, fdi.config.dt
     views = stat.views[: stat.n_views]
@@ -301,7 +303,8 @@ def find_alarm_axis(fdi, y, t):
 
 @apart
 def plugin_update(fdi, measured, t):
-    """Take the plug-in's verdict, fdi.plugin_verdict."""
+    """Take the plug-in's verdict, fdi.plugin_verdict. Its theta replaces that of the isolated estimator, whose
+    number is that of the surface here (loop/plugin_frame.py)."""
     fdae.fdae_residual(fdi.fdae, measured.x)
     conclusion.record_plugin_verdict(fdi.verdict, fdi.plugin_verdict, t)
     if fdi.verdict.isolated_estimator >= 0:

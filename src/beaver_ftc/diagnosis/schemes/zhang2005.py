@@ -1,7 +1,7 @@
 """The published scheme, to the letter (`fdi.scheme: zhang2005`) [Zhang2005, sec. IV, eq. (3) and (4)].
 
     FDAE         xhat0' = -Lambda0 (xhat0 - x) + f + G u + fhat(x, u, th0),     eps0 = x - xhat0
-                 th0' = P{Gamma Z^T D[eps0]},   Z = d fhat / d th0,   th0 = 0 until Td
+                 th0' = P{Gamma Z^T D[eps0]},   Z = d fhat / d th0,   th0 = 0 until Td (option dead_zone)
     detection    Td = inf {t: |eps0_i(t)| > ebar_i(t), some i},   ebar_i = int e^{-lam (t-tau)} eta_bar_i dtau
     FIE s        xhats' = -Lambdas (xhats - x) + f + G u + fhats(x, u, ths) + Oms ths',   from Td on
                  Oms' = -Lambdas Oms + Zs,   Oms(Td) = 0,   ths' = P{Gammas Oms^T epss}
@@ -16,10 +16,11 @@
     lam                1/s       pole of the filter, an element of Lambda
     k_i^s              1         largest distance between theta and its estimate
 
-The estimators are those of detection/filters.py and isolation.py, whose residuals and thresholds these are.
-This file has the differences: Euler steps, a network of (x, u) (detection/state_network.py), gradients
-instead of least squares, and alarms by the FDAE alone. D[eps] is 0 while the residuals of all axes are within
-their thresholds, and the whole of eps otherwise [Zhang2002]. w is 0, since xhats(Td) = x(Td); with noisy
+The FDAE is that of detection/fdae.py, with the threshold of filter 0 of detection/filters.py; the FIEs are
+those of estimators.py. This file has the differences: Euler steps, a network of (x, u)
+(detection/state_network.py), gradients instead of least squares, and alarms by the FDAE alone. D[eps] is 0
+while the residuals of all axes are within their thresholds, and the whole of eps otherwise [Zhang2002];
+without the option `dead_zone` it is always eps, also before Td. w is 0, since xhats(Td) = x(Td); with noisy
 gyros w is the bound on their noise. Where the paper leaves a choice open, it is an option (plugins.yaml lists
 the options, and how each was chosen). Some options remove a part of the scheme, to measure its effect.
 """
@@ -94,7 +95,11 @@ def fdae_axis(fdae):
 @apart
 def advance_estimators_to_frame(fdi, prediction, measured):
     """Bring isolation, FDAE and its network to this frame. A constant threshold mu0 > 0 then replaces all
-    adaptive ones."""
+    adaptive ones.
+
+    The network learns from residual, threshold and basis of the frame before, and xhat0 moves with the output
+    that `update_verdict` computed there. The network of fdae.py itself never learns (detected: False).
+    """
     pub, dt, mu = fdi.published, fdi.config.dt, fdi.published.config.mu0
     adaptive_estimators.update_filters(fdi, prediction, measured)
     adaptive_estimators.update_estimators(fdi, prediction)
@@ -109,7 +114,8 @@ def advance_estimators_to_frame(fdi, prediction, measured):
 
 @apart
 def update_verdict(fdi, prediction, measured, t):
-    """Raise the alarm by the FDAE, evaluate its network, and isolate."""
+    """Unless a sensor is found broken, raise the alarm by the FDAE, evaluate its network for the next frame,
+    and isolate."""
     if sensor_monitor.has_alarm(fdi.sensor_monitor):
         return
     net = fdi.published.network

@@ -1,8 +1,8 @@
 """Whether there is a fault, which it is, and how large: detection, isolation, fault types, monitors.
 
 This file has the contract between the loop and a diagnosis scheme that is plugged in (`Detector`). A detector
-is given the measurements, the command in effect, and the accelerations that the design model computes from
-the two. It is given nothing of the truth.
+is given the measurements, the deflections of healthy surfaces, and the accelerations that the design model
+computes from the two. It is given nothing of the truth.
 """
 
 from math import nan

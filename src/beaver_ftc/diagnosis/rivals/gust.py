@@ -56,7 +56,7 @@ class VaneGust:
     def _noise(self, context: Context) -> np.ndarray:
         """Standard deviation (3,) rad/s2 of the effect, by the noise of a sample of each instrument.
 
-        Standard deviations, rad/s, that a sample of alpha, theta, V, phi and a_z gives q_g, by their noises:
+        Standard deviation, rad/s, that the noises of a sample of alpha, theta, V, phi and a_z give q_g:
 
             (hypot(alpha, theta) + 0.3 (V_noise / V + phi) + dt a_z / V) / tau_q
 

@@ -1,7 +1,8 @@
 """Our scheme: it detects by the bank of filters and the statistical detector, and isolates by fault class.
 
 The acceleration by known faults is part of the prediction, so the estimator of the unknown (FDAE) explains
-the rest. The verdict of a Python plug-in replaces ours; our estimators go on, because the laws use them.
+the rest. The verdict of a Python plug-in replaces ours; bank and FDAE go on, because the laws use what the
+FDAE estimates.
 
 The isolation depends on the fault class, and on the detectors whose exclusions count (`exclusion_authority`):
 
@@ -248,7 +249,8 @@ def update_gusts(stat, du, pred, meas, k, dt):
 
 @kernel
 def step_view_gust(gust, y, pred, meas, k, dt):
-    """Update a gust estimate by accelerometers that the views alone use; y (5,) with its flow angles."""
+    """Update a gust estimate by accelerometers that the views alone use, once a frame; y (5,) with its flow
+    angles."""
     gust.memory.f_read[:] = meas.force
     gusts.set_intensity(gust, meas.altitude)
     gusts.step_gust(gust, y, meas.attitude, dt, k)
@@ -291,8 +293,8 @@ def update_verdict(fdi, prediction, measured, t):
 
 @kernel
 def find_alarm_axis(fdi, y, t):
-    """The axis on which a detector raises the alarm, or -1. An engine that has failed is outside the class:
-    no surface is isolated then. y: measured signals."""
+    """The axis on which a detector raises the alarm, or -1. An engine that fails before any alarm is outside
+    the class: the alarm is in yaw, and no surface is isolated. y: measured signals."""
     limit = fdi.bound.error_map.Cn_now
     concluded = fdi.verdict
     if not concluded.detected and engine_monitor.detect_engine_failure(fdi.engine_monitor, limit, y):
@@ -303,8 +305,8 @@ def find_alarm_axis(fdi, y, t):
 
 @apart
 def plugin_update(fdi, measured, t):
-    """Take the plug-in's verdict, fdi.plugin_verdict. Its theta replaces that of the isolated estimator, whose
-    number is that of the surface here (loop/plugin_frame.py)."""
+    """Take the plug-in's verdict, fdi.plugin_verdict. Its theta replaces that of the isolated estimator; an
+    estimator has the number of its surface here (loop/plugin_frame.py)."""
     fdae.fdae_residual(fdi.fdae, measured.x)
     conclusion.record_plugin_verdict(fdi.verdict, fdi.plugin_verdict, t)
     if fdi.verdict.isolated_estimator >= 0:

@@ -211,7 +211,7 @@ def assess_surfaces(out, cfg, conclusion, types, layout, fies, stat):
 
         a plug-in estimates effectiveness, after its alarm     the plug-in
         the fault types have set a mode for the surface        `assess_surface`
-        only losses are diagnosed, and that of it is isolated  `isolated_theta`
+        only losses are diagnosed, and its loss is isolated    `isolated_theta`
         otherwise                                              1, no offset, no lag
 
     The law has no target if no surface is isolated or accommodated, and no plug-in estimates effectiveness.
@@ -236,7 +236,8 @@ def assess_surfaces(out, cfg, conclusion, types, layout, fies, stat):
 
 @kernel
 def hold_assessment(out, types):
-    """Keep the assessment from before a sensor broke: effectiveness, and offsets of constant faults.
+    """Keep the assessment from before a sensor broke: effectiveness, and offsets of constant faults and of
+    surfaces that are given up.
 
     Lags, and offsets that vary from frame to frame, cannot be estimated without the sensor, and become zero.
     """

@@ -9,9 +9,10 @@ Every hypothesis is linear in one unknown parameter per axis, phi_i = h_i + thet
     loss of effectiveness   h_i = 0         Z_i = G_is u_s      theta in [-1, 0]       [Zhang2005, eq. (4)]
     position                h_i = -G_is u_s Z_i = G_is          theta in the travel, extended to 0
 
-LOSS on aileron, elevator and rudder is the published class. POSITION_HYPOTHESIS states only that the surface
-does not follow its command. Its parameter, the deflection in rad, may change in any way, so it covers every
-fault of the surface. Both together are `fdi.fault_class: all`; types/ decides which type of fault it is.
+LOSS on aileron, elevator and rudder of the Beaver is the published class. POSITION_HYPOTHESIS states only
+that the surface does not follow its command. Its parameter, the deflection in rad, may change in any way, so
+it covers every fault of the surface. Both together are `fdi.fault_class: all`; types/ decides which type of
+fault it is.
 
 Likelihood ratios exclude a loss of the published class, or confirm it. A confirmed loss is never excluded by
 likelihood. A loss that only the end of an undetected earlier loss in pitch could explain is weakly excluded:
@@ -171,7 +172,7 @@ EstimatorEntry = tuple[str, int, int]
 def list_estimators(fault_class: str, aircraft: Aircraft) -> tuple[EstimatorEntry, ...]:
     """The isolation estimators of a fault class, in the bank's order.
 
-    published: a loss of the surface that leads each axis, and of what turns with it
+    published: a loss of the surface that leads each axis, and of every other one but the stand-ins
     all: those losses, a loss of each stand-in, and a position of every surface
     """
     index = {name: s for s, name in enumerate(aircraft.surfaces)}

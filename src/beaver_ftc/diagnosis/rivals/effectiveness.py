@@ -9,8 +9,8 @@
     nu, S           rad/s, (rad/s)2   innovation and its covariance
 
 The filters assume white noise, and the declared bound on the uncertainty describes none. `noise` times this
-bound is taken for the standard deviation. The declared gyro noise is that of the measurement; declared
-turbulence adds states (kalman.py).
+bound (`KalmanRival.add_noise`) is taken for the standard deviation. The declared gyro noise is that of the
+measurement; declared turbulence adds states (kalman.py).
 """
 
 from collections.abc import Mapping

@@ -83,7 +83,7 @@ class KalmanRival(RivalDetector):
         Q = diag(q), and for the rates (dt noise size)^2; noise (...): one for each filter. size (3,) rad/s2:
         eta_bar while only the published bound is declared. With further declared errors, eta_bar is the sum
         of all worst cases. Instruments and air have a variance or states of their own here, so that size is
-        the constant bound with the declared model error.
+        the constant bound with the declared model error, the root of the sum of their squares.
         """
         size = self.own_bound if self.context.declared.errors else measured.eta_bar
         diagonal = np.einsum("...ii->...i", P)  # a view

@@ -50,7 +50,7 @@ class InputOutputPredictionTest:
     """
 
     def __init__(self, lam: float, fade: float, least: float) -> None:
-        self._model = RecursiveLeastSquaresFit(5, lam, 1e4)
+        self._model = RecursiveLeastSquaresFit(5, lam, 1e4)  # 1e4: the weights are not known at the start
         self._fade = fade
         self._least = least
         self._phi = np.array([0.0, 0.0, 0.0, 0.0, 1.0])

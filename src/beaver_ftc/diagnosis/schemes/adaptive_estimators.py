@@ -114,8 +114,9 @@ def exclude_or_wait(fdi, fie, possible, t):
 
 @kernel
 def isolate(fdi, meas, t, started):
-    """Exclude faults at t s, and decide; started: whether the isolation started a frame or more ago. While a
-    gyro may be the cause of the alarm, nothing is decided."""
+    """Exclude faults at t s, and decide; started: whether the isolation started a frame or more ago. If only
+    the exclusions of the statistical detector count, the worst case excludes nothing. While a gyro may be the
+    cause of the alarm, nothing is decided."""
     cfg, iso, bank = fdi.config, fdi.isolation, fdi.bank
     for j, fie in enumerate(iso.estimator[: iso.config.n_estimators]):
         possible = isolation.fault_possible(iso, fie, bank, fdi.bound.nu_max, cfg.abrupt, meas.x, started)

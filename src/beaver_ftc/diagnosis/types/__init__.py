@@ -10,7 +10,7 @@ one at some time.
     loss            p = (1 + theta) u      1 + theta in [0, 1], constant
     varying loss    the same               1 + theta anywhere in [0, 1] in every frame (incipient)
     stuck           p = c                  c in the travel
-    float           p = 0
+    float           p = 0                  or the stop nearest to 0
     hardover        p reaches its stop at no less than half its rate limit, and stays
     bias            p = u + b              b constant; cut off by the stops
     oscillatory     p - u swings about 0   no half-cycle longer than pi / slowest oscillation
@@ -109,7 +109,9 @@ class FaultType:
     parameter_range(srf, h)
                             the parameters (low, high) that there are; unlimited if left out
     deflection_range(c, srf, h, k)
-                            least and greatest deflection under it by frame k, rad; of a constant type
+                            least and greatest deflection under it by frame k, rad; of a constant type. k is
+                            the elapsed frame (pairs.py), or for `holds_surface` the judged one or the one
+                            before it
     holds_surface           it holds the surface there, and may release it (release.py): that explains a frame
     memory_dtype, memory_record_name
                             a record of its own, found at `srf.<memory_record_name>`

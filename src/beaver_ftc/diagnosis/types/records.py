@@ -18,7 +18,7 @@ from beaver_ftc.diagnosis.types import OBSERVATION_RECORD
 from beaver_ftc.diagnosis.types.registry import N_TYPES, TYPES
 from beaver_ftc.scenario.declared import Declared
 
-# Duration of a block where gyros are noisy: much less than the slowest half-cycle, by default 3.1 s.
+# Least duration of a block where gyros are noisy: much less than the slowest half-cycle, by default 3.1 s.
 BLOCK_DURATION_S = 0.2
 MAX_BLOCK = 256  # frames of a block
 N_KEPT = 3  # blocks whose commands are kept: the elapsed one and two before it
@@ -91,7 +91,7 @@ TYPES_CONFIG_RECORD = record(
     returns_lagged=int,  # whether a repaired surface returns with lag or rate limit
     half_frames=int,  # blocks in half a cycle of the slowest oscillation
     abrupt=int,  # whether a fault is declared to stay as it is
-    has_eG=int,  # as that of `bound_dtype`: whether the surfaces' own terms have errors (fault_class: all)
+    has_eG=int,  # as in `bound_dtype`: whether errors of each surface's own terms count
     frames_per_block=int, block_duration_s=float, dt=float,
 )  # fmt: skip
 

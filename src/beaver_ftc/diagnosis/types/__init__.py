@@ -124,7 +124,7 @@ class FaultType:
 
     has_shown(srf, h)       kernel: whether the type has shown itself. A type with this part explains a flight
                             only once it has shown itself
-    show_half_cycles        half-cycles of the slowest oscillation within which such a type shows itself
+    show_half_cycles        half-cycles of the slowest oscillation for which a verdict waits for it
     evidence_at_rest        what a surface that was given up, and stays where it was, says of the type:
                             REST_IS_UNINFORMATIVE, REST_EXCLUDES_TYPE, REST_HIDES_TYPE (it may be there all
                             the same) or REST_POSITION_IS_PARAMETER (its parameter is the deflection at
@@ -236,8 +236,7 @@ def put_set(srf, h, interval):
 def intersect_set(srf, h, other):
     """Intersect the set of type h with `other`, (low, high); exclude the type if the result is empty.
 
-    The set of an excluded type then has the two bounds that contradict each other. EMPTY_SET has no such
-    bounds: a type that it excludes keeps its set.
+    low > high in the set of a type that is excluded so; one that EMPTY_SET excludes keeps its set.
     """
     if other == EMPTY_SET:
         srf.sets.excluded[h] = 1
@@ -278,14 +277,14 @@ def forget_anomalies(srf):
 @kernel
 def observe_surface(c, srf, fie, m, nu, nu_max, eff):
     """Fill `last`: where a healthy surface was, u = -h_m / Z_m, and where this one can have been, the
-    interval of the deflections p, rad, with
+    interval of the deflections p within reach, rad, with
 
         |nu - G (p - u)| <= nu_max + r        on every axis; over a block on axis m alone
 
-    from the innovation nu = eta + G (p - u) and |eta| <= nu_max, (3,) rad/s2, within reach. m: the axis on
-    which the surface has most effect; eff: Z = G, rad/s2 per rad, h = -G u, rad/s2, tolerance r, rad/s2;
-    fie: the estimator of its position. Over a block the axes weigh a varying position differently, so that
-    they need not agree on its mean.
+    from the innovation nu = eta + G (p - u) and |eta| <= nu_max, (3,) rad/s2. m: the axis on which the
+    surface has most effect; eff: Z = G, rad/s2 per rad, h = -G u, rad/s2, tolerance r, rad/s2; fie: the
+    estimator of its position. Over a block the axes weigh a varying position differently, so that they need
+    not agree on its mean.
     """
     last, cmd = srf.last, srf.commands
     last.u = -eff.h[m] / eff.Z[m]

@@ -108,8 +108,8 @@ def explains_flight(srf):
 
 @kernel
 def would_have_shown(c, srf):
-    """Whether each type that must show itself is excluded, or has had its time to do so: SHOW_HALF_CYCLES
-    half-cycles of frames in which no stop could hide it (`n_unhidden`)."""
+    """Whether each type that must show itself is excluded, or has been waited for: SHOW_HALF_CYCLES
+    half-cycles of anomalous frames in which no stop could hide it (`n_unhidden`)."""
     for h in range(N_TYPES):
         if type_remains(srf, h) and srf.evidence.n_unhidden < SHOW_HALF_CYCLES[h] * c.half_frames:
             return False
@@ -207,8 +207,8 @@ def others_dismissed(types, sole):
 
         n_anomalous of `sole` >= half_frames max(1, WAIT_HALF_CYCLES of the types that remain on the others)
 
-    A type that must show itself has had its time (`would_have_shown`). If errors of the surfaces' effects are
-    declared (has_eG), a varying fault can hide in them, and every type of the others must be excluded.
+    A type that must show itself has been waited for (`would_have_shown`). If errors of the surfaces' effects
+    are declared (has_eG), a varying fault can hide in them, and every type of the others must be excluded.
     """
     c, wait_half_cycles = types.config, 1
     for s, srf in enumerate(types.surface):

@@ -92,7 +92,7 @@ def _no_estimate(fdi: np.void, s: int, h: int) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class FaultType:
-    """One fault type. A part that is left out has nothing to do.
+    """One fault type. A field that is left out has its default.
 
     name                    in scenarios, reports and metrics
     description             the type in words, where the name does not say which of two types it is

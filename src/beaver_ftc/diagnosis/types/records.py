@@ -73,12 +73,12 @@ STATUS_RECORD = record(
     fault_type=int, typed_at_s=float,  # type of the isolated fault, -1 if open; since when, s
 )  # fmt: skip
 
-# The mode of accommodation, -1 for none; frames since the fault last showed.
+# The mode of accommodation, -1 for none; frames since one last agreed with the fault (`modes.count_silence`).
 ACCOMMODATION_RECORD = record(mode=int, n_silent=int)
 
 # The return of a surface that a type has held and released, rad; release.py has the theory. back: where the
-# surface can be on its way; released: whether it has been released; held: where the type holds it by then;
-# set: the set of the type's parameter before the release.
+# surface can be on its way; released: whether it has been released; held: where a release within the judged
+# block begins, low > high if none can; set: the set of the type's parameter before the release.
 RELEASE_RECORD = record(
     back_lo=(2, N_TYPES), back_hi=(2, N_TYPES), released=(int, N_TYPES), held_lo=N_TYPES, held_hi=N_TYPES,
     set_lo=(2, N_TYPES), set_hi=(2, N_TYPES),

@@ -66,8 +66,8 @@ class LogInputs:
 
     @cached_property
     def gap_free_stretches(self) -> Runs:
-        """First row and end of each stretch through which the diagnosis is stepped without a reset: evenly
-        spaced, and without a missing number."""
+        """First row and end of each stretch through which the diagnosis is stepped without a reset: at least
+        _MIN_SAMPLES, evenly spaced, and without a missing number."""
         uneven = np.abs(np.diff(self.samples.t_s) * self.rate_hz - 1.0) > _STEP_JITTER
         joins = ~(self.has_missing_value[1:] | self.has_missing_value[:-1] | uneven)
         return [(begin, end + 1) for begin, end in true_runs(joins) if end + 1 - begin >= _MIN_SAMPLES]
@@ -129,8 +129,9 @@ def read_inputs(log: RecordedFlight, vehicle: Vehicle, diagnosed: DiagnosedAircr
 
 
 def _flow_columns(log: RecordedFlight, vehicle: Vehicle, aircraft: Aircraft) -> dict[str, str]:
-    """The column of each signal of the aircraft's design model, in their order in the inputs of the
-    diagnosis. Raises BadInput if the vehicle file or the log lacks one."""
+    """The column of each signal of FLOW and of the aircraft's design model, in their order in the inputs of
+    the diagnosis. Raises BadInput if the vehicle file or the log lacks one, or if the file lacks a
+    surface."""
     missing = [name for name in aircraft.surfaces if name not in vehicle.surfaces]
     if missing:
         allowed = f"what the commands make of {', '.join(aircraft.surfaces)}"
@@ -160,7 +161,7 @@ def _attitude_columns(flight: str, columns: dict[str, Column], vehicle: Vehicle)
 
 def _log_rate_hz(samples: Samples) -> float:
     """Sample rate, Hz, to four digits, of the first _MIN_SAMPLES samples, so that a log that was cut short
-    has the same rate."""
+    has the same rate. Raises BadInput if it is not from _MIN_HZ to _MAX_HZ."""
     steps_s = np.diff(samples.t_s[:_MIN_SAMPLES])
     even_s = steps_s[np.abs(steps_s / samples.dt_s - 1.0) < _STEP_JITTER]
     rate_hz = float(f"{1.0 / (even_s.mean() if len(even_s) else samples.dt_s):.4g}")

@@ -1,14 +1,15 @@
 """The inputs of the bank of filters: its hypotheses, how a flight may differ from the model, the noise.
 
-The hypotheses: all healthy; one group of surfaces at a level of effectiveness; two groups at once; an unknown
-offset of the rates; nothing answers the commands. Their prior probabilities follow from the model's settings:
-the levels in labelled flights, and the rate of changes.
+The hypotheses: all healthy; one group of surfaces at a level of effectiveness; two groups at once; if a
+surface may be stuck, an unknown offset of the rates; nothing answers the commands. The shares below and the
+levels in labelled flights give their prior probabilities.
 
 Trim, common gain and each group's own gain may differ from the model. They start from it and are bounded, so
 that the filter does not adapt to a fault that exists from the start. The trim differs as another loading or
 rigging would change it, which is like a shift of each group's command, and it drifts. Gains return to those
 of the model in time, since the airspeed varies about that of the fitted flights. If the standard error of a
-group's gain is larger than a step between levels, the excess is added to the variance of its own gain.
+group's gain is larger than a step between levels, the excess of its square is added to the variance of its
+own gain.
 
 Letters as in `filtering`: n groups, B (n, L, 3) the responses and R (3, 3) the covariance of the noise, in
 rad/s and (rad/s)2 for one sample. Index g is a group.
@@ -25,7 +26,8 @@ from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
 from beaver_ftc_logs.trust import known_effects
 
 HEALTHY, GROUP_LOSS, PAIR_LOSS, UNKNOWN_OFFSET, NO_RESPONSE = range(5)
-# Shares of all changes of hypothesis that lead to a loss of two groups, to an unknown offset, to no response.
+# Shares of the changes that do not restore health, before they are normalised to the sum 1: changes to a loss
+# of two groups, to an unknown offset, to no response.
 _PAIR_SHARE = 0.02
 _OFFSET_SHARE = 0.05
 _SILENT_SHARE = 0.02
@@ -33,8 +35,8 @@ _PAIR_LEVELS = (0.25, 0.5, 0.75)  # a coarse grid, for the time of `diagnose`
 # Probabilities before the flight.
 _PRIOR_HEALTHY = 0.7
 _PRIOR_NO_RESPONSE = 0.2
-# Largest squared residual that counts if the noise has an AR predictor: the predictor needs a fraction of a
-# second to adapt to a fault.
+# Squared residual from which on a larger one counts no more, if the noise has an AR predictor: the predictor
+# needs a fraction of a second to adapt to a fault.
 _MAX_SQUARE = 30.0
 
 
@@ -50,8 +52,8 @@ class HypothesisBank(NamedTuple):
     lead to this one. rate_offset_variance (H, 3): variance of the offset of the rates that comes with it,
     (rad/s)2. prior_probability (H,): probability before the flight. change_probability_per_sample:
     probability that the hypothesis changes within a sample. own_gain_share (H, G): share of a group's healthy
-    response that the group's own gain multiplies: the effectiveness, or 1 where the response of a control law
-    to noise adds to the effect of a surface.
+    response that the group's own gain multiplies: the effectiveness; 1 if other laws may fly, where the
+    response of a control law to noise adds to the effect of a surface.
     """
 
     effectiveness: Floats
@@ -105,8 +107,8 @@ def build_bank(model: Model) -> HypothesisBank:
 
 def _single_hypotheses(model: Model, groups: list[int], share: float) -> Iterator[HypothesisRow]:
     """One group at each of its levels, for each fault kind of the vehicle (`_offset_variances`). share: share
-    of all changes of hypothesis that lead to one of these; each surface has an equal part of it, and each
-    fault kind an equal part of this."""
+    of the changes that lead to one of these, before it is normalised; each surface has an equal part of it,
+    and each fault kind an equal part of this."""
     n_surfaces = sum(len(model.groups[g]) for g in groups)
     for g in groups:
         levels, shares = _levels_and_shares(model, g)
@@ -157,7 +159,7 @@ def _offset_variances(model: Model, g: int) -> list[Floats]:
 
 
 def _pair_hypotheses(n: int, groups: list[int]) -> list[HypothesisRow]:
-    """Two of the known groups at once, on a coarse grid."""
+    """Two of the given groups at once, at the levels _PAIR_LEVELS; n: number of all groups."""
     pairs = list(product(combinations(groups, 2), product(_PAIR_LEVELS, repeat=2)))
     rows = [_effect_row(n, dict(zip(pair, levels, strict=True))) for pair, levels in pairs]
     return [(row, PAIR_LOSS, _PAIR_SHARE / len(pairs), np.zeros(3)) for row in rows]
@@ -191,7 +193,8 @@ class StateModel(NamedTuple):
 
 def build_states(model: Model, noise: NoiseModel) -> StateModel:
     """The prior and the limits of trim and gains, from a model's settings: mean x (N,), covariance P (N, N),
-    retention a (N,) = exp(-1 / (rate return_s)) a sample, and walk (N,) = (1 - a^2) diag(P).
+    retention a (N,) = exp(-1 / (rate return_s)) a sample, and walk (N,) = (1 - a^2) diag(P), which keeps P;
+    the trim does not return, and its walk is r trim_walk^2.
 
     States 0 to 2 are the trim, 3 the common gain, 4 to 3 + n the own gains of the n groups. r (3,): variance
     of the noise, (rad/s)2; shift (n, 3): trim by a shift of each group's command, rad/s; drift, hidden (n,):
@@ -225,8 +228,8 @@ class ResidualNoise(NamedTuple):
     intercept_rad_s (3,): intercept of the model. covariance (3, 3) of a sample, (rad/s)2.
     effective_sample_share: information of a residual over that of a white one. t_degrees_of_freedom of its t
     distribution. scale_memory_samples: memory of the running scale of the covariance. max_squared_residual:
-    squared standardised residual above which a sample carries no information. covariance_inflation:
-    covariance over that of the residuals in the fit.
+    squared standardised residual from which on a sample corrects no state, and a larger one is no less
+    likely. covariance_inflation: covariance over that of the residuals in the fit.
     """
 
     intercept_rad_s: Floats

@@ -75,8 +75,8 @@ def diagnose_aircraft(
 
 def _replay(inputs: LogInputs) -> Replayed:
     """The verdicts of all samples. Rows between stretches have no alarm and bounds 0 and 1. The gains and
-    their upper bounds are the least of all stretches. Raises BadInput if a command has the opposite
-    effect."""
+    their upper bounds are the least of all stretches. Raises BadInput if, in still air, a command has the
+    opposite effect."""
     replays = [replay_samples(inputs.diagnosis, arrays, inputs.rate_hz) for arrays in inputs.stretches()]
     upper = np.min([replay.command_gain_bounds for replay in replays], axis=0)
     if not inputs.diagnosis.declared.air.moves:  # a law that reacts to gusts commands against their effect

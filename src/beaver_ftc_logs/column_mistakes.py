@@ -56,7 +56,7 @@ _MIN_COMMAND_GAIN = 0.2
 _REVERSED_GAIN_LIMIT = -0.5
 # Largest probability that a correct log seems to have a mistake in its columns.
 _FALSE_MISTAKE_CHANCE = 0.001
-# A longer flight is reduced to about so many samples, to save computing time.
+# A flight is reduced to less than twice this number of samples, to save computing time.
 _MAX_COMPARED_SAMPLES = 8000
 
 
@@ -108,7 +108,7 @@ def refuse_command_unit(
 
 
 def _relative_motion(values: Floats, fitted: Sequence[Sequence[float]]) -> Floats:
-    """Range of each column of values (n, S) over its range in the flights of the model, (S,)."""
+    """Central range of each column of values (n, S) over that in the flights of the model, (S,)."""
     spans = [np.ptp(np.array(ranges).reshape(-1, 2), axis=1) for ranges in (central_ranges(values), fitted)]
     return spans[0] / np.maximum(spans[1], MIN_DIVISOR)
 
@@ -135,7 +135,8 @@ class Answers(NamedTuple):
 def answers(samples: Samples, model: Model, max_samples: int | None = None) -> Answers | None:
     """The responses in the parts of a flight; None if a part is too short.
 
-    max_samples: about the largest number of samples to use. Of a longer flight, only every `step`-th is used.
+    max_samples: half of the largest number of samples to use. Of a longer flight, only every `step`-th is
+    used.
     """
     flight = regression.innovations(samples, model)
     rows = np.flatnonzero(flight.is_known)

@@ -312,7 +312,8 @@ def _replay_run_logs(flights: list[Path], out: Path, format: Format) -> None:
 
 
 def compare_recorded(folder: Path, out: Path, format: Format, markdown_page: Path | None) -> None:
-    """Compare the methods of diagnosis on the recorded flights in a folder. markdown_page: page to update."""
+    """Compare the methods of diagnosis on the recorded flights in a folder. markdown_page: page to update;
+    its picture in the folder `images` beside it is replaced, too."""
     from beaver_ftc.results import result_folder
     from beaver_ftc.studies.present import write_files
     from beaver_ftc_logs.recorded.benchmark import run_benchmark

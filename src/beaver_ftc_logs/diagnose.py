@@ -1,7 +1,8 @@
 """Diagnose a recorded flight with an identified model: alarm, faulty surfaces and effectiveness by sample.
 
-A row uses only samples up to its own time. `posterior_rows` makes the rows from the probabilities of the
-hypotheses. Here the log is checked before, and names and bounds are withdrawn where they are not credible.
+A row uses only samples up to its own time, but for the checks that refuse a whole log. `posterior_rows` makes
+the rows from the probabilities of the hypotheses. Here the log is checked before, and names and bounds are
+withdrawn where they are not credible.
 """
 
 from dataclasses import replace
@@ -65,8 +66,9 @@ def _diagnose_checked_log(samples: Samples, model: Model) -> LogRows:
 
 
 def finish_rows(samples: Samples, model: Model, rows: LogRows, silent: Mask | None = None) -> LogRows:
-    """Rows at the log's own stamps, without a verdict where the model is not credible, and without bounds
-    for a group whose effect is unknown. silent (n,): where nothing answers the commands."""
+    """Rows at the log's own stamps, without a verdict where the model is not credible, and without an
+    estimate for a group whose gain is unknown (`trust.known_gains`). silent (n,): where nothing answers the
+    commands."""
     reasons = trust.untrusted_rows(samples, model)
     if silent is not None:
         reasons["nothing answers the commands: on the ground, or these are not what it follows"] = silent
@@ -80,7 +82,8 @@ def finish_rows(samples: Samples, model: Model, rows: LogRows, silent: Mask | No
 
 def _add_unknown_surfaces(samples: Samples, model: Model, rows: LogRows) -> LogRows:
     """Rows whose name also has each surface of unknown effect, since it may be at fault instead of the
-    isolated one. If a name has several surfaces, any of them may be healthy: the upper bound of each is 1.
+    isolated one. If one is added, or if a name has several groups with `one_group`, any of these surfaces may
+    be healthy: the upper bound of each is 1. The names `unknown` and `engine` stay.
 
     A loss of effectiveness shows only while the command moves: a surface whose command has not moved so far
     is not added. If surfaces can be stuck, any is added.
@@ -106,7 +109,7 @@ def _add_unknown_surfaces(samples: Samples, model: Model, rows: LogRows) -> LogR
 
 
 def _withdraw_by_engine(samples: Samples, model: Model, rows: LogRows) -> LogRows:
-    """Rows that name no surface while the energy height shows a possible engine failure."""
+    """Rows that name no surface while the energy height, if it is known, shows a possible engine failure."""
     unpowered_mps = model.fitted.energy_climb
     rate_mps = samples.energy_height_rate_mps
     if unpowered_mps is None or not np.isfinite(rate_mps).any():
@@ -122,7 +125,7 @@ def _withdraw_contradicted(samples: Samples, model: Model, rows: LogRows, thresh
 
     A faulty surface (stuck, biased or oscillating) changes the rates along the direction of its healthy
     effect. A name is withdrawn if the direction of another group explains more of the residual, by more than
-    the log likelihood `threshold`. Not used in moving air, since gusts have directions too.
+    the log likelihood `threshold`. Not used if there are noise models, since gusts have directions too.
 
         gain_g = power / 2 sum over the last second of (r' m_g / |m_g|)^2
 

@@ -15,6 +15,7 @@ Under hypothesis h, with effectiveness a_h of the groups, the part of the rates 
     nu              degrees of freedom of the t distribution of the noise
     r               running scale of the variance of the noise
     q               variance of a sample over that of the noise, larger after quick commands (`quick_scale`)
+    V               covariance of a sample with its scale, q r R, where r is at least that of `recent_scale`
     e, S, K         residual y - C' x (3,), its covariance (3, 3), gain (N, 3)
     d2              e' S^-1 e
     ll              log likelihood of a sample
@@ -26,8 +27,8 @@ another at random times (interacting multiple models [Blom1988]). The new one ta
 an offset of the rates if a surface may be stuck. The last hypothesis is that nothing answers the commands, as
 on the ground: it estimates no trim and no gain.
 
-The pass is repeated for each delay of the commands that the flight may have; the results are averaged with
-the probabilities of the delays.
+The pass is repeated for each noise model, or else for each delay of the commands that the flight may have.
+The results are averaged with the probabilities of these alternatives (`bank_posterior`).
 """
 
 from collections.abc import Sequence
@@ -49,11 +50,12 @@ _MIN_PROBABILITY = 1e-15
 _MIN_NOISE_SCALE = 0.3
 _MAX_NOISE_SCALE = 6.0
 _SQUARE_CLIP = 3.0  # limit of d2 per axis in the running scale
-_SUM_SPANS_S = (0.0, 0.1)  # `recent_scale` sums the residual over each of these
+_SUM_SPANS_S = (0.0, 0.1)  # `recent_scale` sums the residual over each of these; 0: a single sample
 _VARIANCE_WINDOW_S = 2.0  # `recent_scale` takes the variance of the sums over the last 2 s
-# Mean of the clipped d2 per axis if the running scale is right.
+# Mean of the clipped d2 per axis if the running scale is right: between 0.91, of a t distribution with 8
+# degrees of freedom and the covariance S, and 0.98, of a normal one.
 _MEAN_SQUARE = 0.93
-# Probability of a noise model below which it is left out.
+# Probability of a noise model below which a sample leaves it out.
 _MIN_NOISE_WEIGHT = 1e-3
 
 # The two results of `run_bank`: probabilities (n, H) and log likelihoods (n,).
@@ -65,9 +67,10 @@ def bank_posterior(samples: Samples, model: Model, bank: HypothesisBank) -> Floa
 
     It is a weighted average of several runs of the bank. If the model has noise models (`colours`) and the
     flight is not yet whitened, there is a run for each noise model, otherwise for each command delay of the
-    settings. The weights are the probabilities of the runs given the last minutes (`model_weights`). A noise
-    model is run only up to the last sample at which its weight is not negligible: within a second most become
-    far less likely than another, and stay so.
+    settings. The weights are the probabilities of the runs given the last minutes (`model_weights`): of a
+    delay by the likelihood of its run, of a noise model by that of a healthy flight (`_noise_likelihood`). A
+    noise model is run only up to the last sample at which its weight is at least _MIN_NOISE_WEIGHT: within a
+    second most become far less likely than another.
     """
     if not model.colours or samples.noise_ma_coefficients:
         delays = model.settings.delays_s
@@ -88,8 +91,8 @@ def bank_posterior(samples: Samples, model: Model, bank: HypothesisBank) -> Floa
 
 
 def _noise_likelihood(flight: Innovations, model: Model) -> Floats:
-    """Log likelihood of each sample (n,) if all surfaces are healthy, for a flight that is whitened by the
-    model's noise; 0 where the sample is not known:
+    """Log likelihood of each sample (n,), but for a constant, if all surfaces are healthy, for a flight that
+    is whitened by the model's noise; 0 where the sample is not known:
 
         -power ((nu + 3) log(1 + d2 / nu) + 3 log q + log det R) / 2 + power 3 log sum(ma),   d2 = |e W|^2 / q
 
@@ -103,11 +106,12 @@ def _noise_likelihood(flight: Innovations, model: Model) -> Floats:
 
 
 def fault_evidence(p: Floats, bank: HypothesisBank) -> Floats:
-    """Increase of the log odds of any fault by each sample, (n,), from the probabilities p (n, H):
+    """Increase of the log odds of a fault by each sample, (n,), from the probabilities p (n, H):
 
         z[k] = log odds(f[k]) - log odds((1 - change) f[k-1] + entry)
 
-    f: probability of any fault; change: probability that the hypothesis changes within a sample; entry: the
+    f: probability of a loss of effectiveness (`is_fault_hypothesis`: not of an unknown offset), at least
+    _MIN_PROBABILITY from 0 and 1; change: probability that the hypothesis changes within a sample; entry: the
     probability of a change to a fault. Before the first sample, the prior probability of a fault is used. The
     sum of z is the logarithm of a likelihood ratio.
     """
@@ -122,7 +126,7 @@ def fault_evidence(p: Floats, bank: HypothesisBank) -> Floats:
 
 @kernel
 def page_cusum(z, top):
-    """Page's sum of the evidence z (n,), limited to 0 and top:
+    """Page's sum of the evidence z (n,), between 0 and top:
 
     sums[k] = min(max(sums[k-1] + z[k], 0), top)
     """
@@ -135,7 +139,8 @@ def page_cusum(z, top):
 
 
 def _with_command_delay(samples: Samples, delay_s: float) -> Samples:
-    """The flight with commands that act delay_s later than in the model; at most a sample, may be negative.
+    """The flight with commands that act delay_s later than in the model. A negative delay acts earlier; the
+    magnitude counts up to one sample.
 
     A delayed command is interpolated between two samples. The model uses commands from one sample before the
     rates, so a negative delay needs no later command than that of the same sample.
@@ -174,11 +179,12 @@ def run_flight(flight: Innovations, model: Model, bank: HypothesisBank) -> BankR
 
 
 def recent_scale(g: Floats, ok: np.ndarray, rate_hz: float) -> Floats:
-    """Variance of a flight's residual over the last _VARIANCE_WINDOW_S, over that of the fitted noise, (n,):
+    """Variance of a flight's residual over the last _VARIANCE_WINDOW_S, over that of the noise, (n,):
 
-        max over the spans of the mean of |sum of g over the span|^2 / (3 number of samples in the span)
+        max over the spans of the mean of |sum of g over the span|^2 / (3 number of ok samples in the span)
 
-    g (n, 3): residual in standard deviations of the fitted noise. ok (n,): which samples count.
+    g (n, 3): residual in standard deviations of the noise, 0 where a sample is not ok (n,). The mean is over
+    all rows of the window, so unknown rows lower it.
 
     Air, gyros or a law that no fitted flight had leave a larger residual, and evidence must then count less
     at once. A fault leaves a larger residual, too; the right hypothesis explains it.
@@ -194,15 +200,16 @@ def recent_scale(g: Floats, ok: np.ndarray, rate_hz: float) -> Floats:
 
 @kernel
 def run_bank(y, F, ok, bank, states, noise, r_min, q):
-    """Posterior probabilities (n, H) and ll (n,): the log likelihood of a sample given all before it, times
-    effective_sample_share.
+    """Posterior probabilities (n, H), and the log likelihood of each sample given all before it, but for a
+    constant, (n,): log sum_h prior_h exp(ll_h), as in `_correct`; 0 for a sample that is not used.
 
     ok (n,): whether the sample may be used. bank: HypothesisBank, states: StateModel, noise: ResidualNoise,
     as in `bank`; r_min (n,): lower bound of the scale of the noise; q (n,). After each sample that is used
 
         r <- r exp((1 - p_none) (d2 / 3 - _MEAN_SQUARE) / scale_memory_samples)
 
-    with the probability p_none that nothing answers, and d2 clipped and averaged over the hypotheses.
+    between _MIN_NOISE_SCALE and _MAX_NOISE_SCALE, with the probability p_none that nothing answers, and d2
+    clipped and averaged over the hypotheses.
     """
     n = len(y)
     H = len(bank.transition_share)
@@ -263,7 +270,7 @@ def _merge(w, x, P, m, M, offset, walk):
         x <- w x + v m,    P <- w P + v (M + offset) + w v dx dx' + walk,    dx = x - m
 
     x (N,) and P (N, N) are replaced. offset (3,): variance of the offset of the rates that comes with a
-    change to this hypothesis; walk (N,): variance added a sample.
+    change to this hypothesis, added to that of the trim; walk (N,): variance added a sample.
     """
     v = 1.0 - w
     dx = x - m
@@ -288,24 +295,26 @@ def _relax(x, P, states):
 
 
 @kernel
-def _correct(prior, x, P, y, F, bank, noise, r):
+def _correct(prior, x, P, y, F, bank, noise, scale):
     """Kalman correction of every hypothesis by one sample y (3,), F (G, 3); x and P are replaced. The last
     hypothesis has no states: nothing answers.
 
-        ll_h = -((nu + 3) / 2) log(1 + d2_h / nu) - log(det S_h) / 2,      p_h ~ prior_h exp(ll_h)
+        ll_h = effective_sample_share (-((nu + 3) / 2) log(1 + min(d2_h, d2_max) / nu) - log(det S_h) / 2)
+        p_h ~ prior_h exp(ll_h)
 
-    r: scale of the noise. Returns the posterior probabilities (H,), the clipped d2 averaged over them (in the
-    covariance without its inflation), and the log likelihood of the sample.
+    scale: q r, so V = scale R. d2_max: max_squared_residual. Returns the posterior probabilities (H,), d2 (in
+    the covariance without its inflation) clipped to 3 _SQUARE_CLIP and averaged over them, and log sum_h
+    prior_h exp(ll_h).
     """
     H, N = x.shape
     ll = np.empty(H)
     d2 = np.empty(H)
     none = np.zeros((N, 3))
-    R = noise.covariance * r
+    V = noise.covariance * scale
     nu = noise.t_degrees_of_freedom
     for h in range(H):
         C = _sensitivities(bank.effectiveness[h], bank.own_gain_share[h], F, noise.intercept_rad_s, N)
-        d2[h], log_det = _update(x[h], P[h], y, none if h == H - 1 else C, R, noise)
+        d2[h], log_det = _update(x[h], P[h], y, none if h == H - 1 else C, V, noise)
         log_t = -0.5 * (nu + 3.0) * np.log(1.0 + min(d2[h], noise.max_squared_residual) / nu)
         ll[h] = noise.effective_sample_share * (log_t - 0.5 * log_det)
     top = ll.max()
@@ -336,10 +345,10 @@ def _sensitivities(a, kappa, F, c, N):
 
 
 @kernel
-def _update(x, P, y, C, R, noise):
-    """Correct one Gaussian, x (N,) and P (N, N), by y (3,) = C' x + noise of covariance R; both are replaced:
+def _update(x, P, y, C, V, noise):
+    """Correct one Gaussian, x (N,) and P (N, N), by y (3,) = C' x + noise of covariance V; both are replaced:
 
-        e = y - C' x,   D = P C,   S = R + C' D,   d2 = e' S^-1 e,   K = D S^-1 min(1, (nu + 3) / (nu + d2))
+        e = y - C' x,   D = P C,   S = V + C' D,   d2 = e' S^-1 e,   K = D S^-1 min(1, (nu + 3) / (nu + d2))
         x <- x + K e,   P <- P - K D'
 
     The last factor of K reduces it for a residual in the tail of the t distribution. K is 0 if d2 is at least
@@ -348,7 +357,7 @@ def _update(x, P, y, C, R, noise):
     nu = noise.t_degrees_of_freedom
     D = P @ C
     e = y - x @ C
-    S_inv, det = _invert(R + C.T @ D)
+    S_inv, det = _invert(V + C.T @ D)
     d2 = e @ S_inv @ e
     K = D @ S_inv
     K *= min(1.0, (nu + 3.0) / (nu + d2)) if d2 < noise.max_squared_residual else 0.0

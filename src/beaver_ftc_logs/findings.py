@@ -50,8 +50,9 @@ def span_entry(samples: Samples) -> Document:
 def fault_events(rows: LogRows, surfaces: list[str]) -> list[Document]:
     """The events: periods of an alarm with one name and one effectiveness.
 
-    A period of less than MAX_BRIEF_EVENT_S joins the event before it. If there is none, it is an event of its
-    own, marked as brief. Events use later samples, which rows do not.
+    A period of less than MAX_BRIEF_EVENT_S joins the event directly before it. If there is none, it is an
+    event of its own, marked as brief; `_join_runs` has all rules. Events use later samples, which rows do
+    not.
     """
     _, index = np.unique(rows.isolated_surfaces.astype(str), return_inverse=True)
     columns = np.column_stack([index, rows.faulty, rows.faulty[:, None] * rows.effectiveness])
@@ -66,7 +67,8 @@ def _join_runs(rows: LogRows, runs: Runs) -> Runs:
         both have the same name and effectiveness, or
         the other one is brief and its name is `unknown`.
 
-    before: the last run of those joined so far, which begins at row `first`; empty for the first run.
+    Name and effectiveness of a joined run are those of its first row. before: the last run of those joined so
+    far, which begins at row `first`; empty for the first run.
     """
     joined: Runs = []
     for begin, end in runs:
@@ -90,7 +92,8 @@ def _is_brief(rows: LogRows, begin: int, end: int) -> bool:
 
 
 def _fault_event_entry(rows: LogRows, begin: int, end: int, surfaces: list[str]) -> Document:
-    """One event, with its most frequent name and the medians of the effectiveness."""
+    """One event, with its most frequent name, its largest probability, and the medians of the effectiveness:
+    of the named surfaces, or of all if none is named."""
     names, counts = np.unique(rows.isolated_surfaces[begin:end].astype(str), return_counts=True)
     most_frequent = str(names[counts.argmax()])
     shown_surfaces = surfaces if most_frequent in (UNKNOWN_SURFACE, ENGINE) else most_frequent.split("+")

@@ -84,7 +84,7 @@ def estimate_filter_settings(parts: Parts, model: Model) -> FilterSettings:
         labels show a fault          levels, changes_per_hour, repair_share            as above
         no label shows one           trim_walk, of parts left out                      min(limit, 1 / s)
 
-    s: overdispersion of the gains in parts left out, with the settings of the rows above. limit:
+    s: overdispersion of the gains in parts left out, with the settings of all these rows. limit:
     _POWER_UNLABELLED; if other laws may fly, _POWER_OTHER_LAWS in still air and 1 in moving air.
     """
     vehicle = model.vehicle
@@ -149,8 +149,8 @@ def quick_error_share(parts: Parts, model: Model) -> float:
 
         share^2 = mean over the unusual samples of (square / r - 1) / power
 
-    r: variance of the noise of this flight; power (n,): of the quick responses; square (n,): of the residual,
-    the mean of three axes.
+    r: variance of the noise of this flight, at least 1; power (n,): of the quick responses; square (n,): of
+    the residual less its median, the mean of three axes.
     """
     shares = []
     for fold in held_out_folds(parts, model):
@@ -178,7 +178,8 @@ def _estimate_trim_walk(parts: Parts, model: Model) -> list[float]:
     runs = [(run, np.diag(flight.R)) for flight in flights for run in flight.residual_runs()]
 
     def squared_steps(n: int) -> Floats:
-        """Squares of the differences between successive means of n samples, in variances r, (.., 3)."""
+        """Squares of the differences between successive means of n samples, in variances r, (.., 3), within
+        each run."""
         means = [run[: len(run) // n * n].reshape(-1, n, 3).mean(axis=1) for run, _ in runs]
         steps = (np.diff(mean, axis=0) for mean in means)
         return np.vstack([d**2 / np.maximum(r, MIN_DIVISOR) for d, (_, r) in zip(steps, runs, strict=True)])

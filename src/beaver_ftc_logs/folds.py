@@ -20,8 +20,9 @@ _MAX_SPLITS = 12  # largest number of refits, to limit the time of `identify`
 
 
 class Fold(NamedTuple):
-    """A part left out (`held_out`), its name, the other parts (`fitted`) and their model. Of the ranges of
-    the model (`model.fitted`), only the standard errors of the gains and the tied shares are set."""
+    """A part left out (`held_out`), its name, the parts of the refit (`fitted`) and their model. Of the
+    ranges of the model (`model.fitted`), only the standard errors of the gains and the tied shares (of all
+    parts) are set."""
 
     model: Model
     held_out: FitPart
@@ -65,7 +66,8 @@ def fold_qualities(parts: Parts, model: Model) -> list[Document]:
 
 def prediction_quality(fold: Fold) -> Document:
     """For each axis the share of the rates' variance that one-step prediction explains, 1 - var(e) / var(y),
-    and the standard deviation of the residual e, rad/s; y: the rates."""
+    and the standard deviation of the residual e, rad/s; y: the rates. Without a sample, only their number
+    0."""
     flight = one_step_innovations(fold.model, fold.held_out)
     y = fold.held_out.samples.rates[flight.rows]
     e = flight.e

@@ -15,7 +15,7 @@ from beaver_ftc_logs.regression import Parts
 
 _WINDOW_S = 2.0  # length of a free run
 _MIN_WINDOWS = 20  # with fewer windows, lag and delay are not fitted
-_MAX_WINDOWS = 400  # if there are more windows, about this many, spread over the flights, are used
+_MAX_WINDOWS = 400  # of W windows, every (W // 400)-th is used: less than 800, spread over the flights
 _MAX_DELAY_S = 0.6  # limit of the search, as are the next two
 _MIN_SERVO_LAG_S = 0.005
 _MAX_SERVO_LAG_S = 1.0
@@ -23,7 +23,8 @@ _MAX_SERVO_LAG_S = 1.0
 
 def fit_output_error(parts: Parts, groups: Groups) -> Document:
     """Fit on every other window, test on the rest. Returns servo lag and delay in s, their standard errors,
-    and the share of the rates' variance that is explained in windows not fitted, for each axis.
+    and the share of the rates' variance that is explained in windows not fitted, for each axis; only the
+    number of windows and a text if they are too few or a rate does not move.
 
     th: parameters, as in `_simulate`; P = (J' J)^-1, with the Jacobian J of the weighted errors; the standard
     errors are sqrt(diag(P) mean of the squared errors).

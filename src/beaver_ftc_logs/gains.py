@@ -37,7 +37,7 @@ def gain_overdispersion(parts: Parts, model: Model) -> float:
     If the noise were white and all flights alike, the square of g in the covariance (F' F)^-1 + S would on
     average equal the number of gains. Differences between flights and the colour of the noise make it larger.
     The information of a sample about an effectiveness is smaller by this ratio [McCullagh1989, section 4.5].
-    One further part with the ratio 1 is counted.
+    One further part with the ratio 1 and a gain for each group is counted.
     """
     errors = [(float(len(model.groups)), len(model.groups))]
     for fold in held_out_folds(parts, model):
@@ -48,9 +48,9 @@ def gain_overdispersion(parts: Parts, model: Model) -> float:
 
 def widen_noise(parts: Parts, model: Model) -> Model:
     """The model whose noise models have a variance inflation (`wider`), at least 1: the mean over all windows
-    of _GAIN_WINDOW_S in parts left out of the squared errors of the gains over the expected ones, with a gain
-    for each axis of a response; under other laws, times _GYRO_FACTOR or _GUST_FACTOR. In flights with quiet
-    gyros, the errors of the model itself decide."""
+    of _GAIN_WINDOW_S in parts left out, with this noise, of the squared errors of the gains over the expected
+    ones, each at most _MAX_INFLATION, with a gain for each axis of a response; under other laws, times
+    _GYRO_FACTOR or _GUST_FACTOR. A noise without a window gets 1."""
     windows: dict[tuple[float, ...], list[float]] = {}
     for fold in held_out_folds(parts, model):
         loudness = _loudness(fold, fold.fitted if len(parts) > 1 else parts)
@@ -73,8 +73,9 @@ def widen_noise(parts: Parts, model: Model) -> Model:
 
 def _loudness(fold: Fold, others: Parts) -> float:
     """Ratio of the variance of the residual in a flight left out to that in the loudest other flight of the
-    same noise; 1 if it is not louder, or if no other laws fly. The filter widens its noise by this ratio
-    itself (`recent_scale`), so `_gain_errors` divides F and e by its root."""
+    same noise, or to that of the noise if it is larger; 1 if the flight is not louder, or if no other laws
+    fly. The filter widens its noise by this ratio itself (`recent_scale`), so `_gain_errors` divides F and e
+    by its root."""
     model = fold.model
     ma = fold.held_out.samples.noise_ma_coefficients
     if not model.vehicle.other_laws:
@@ -90,7 +91,8 @@ def _loudness(fold: Fold, others: Parts) -> float:
 
 
 def _gain_errors(fold: Fold, window_s: float | None = None, loudness: float = 1.0) -> list[tuple[float, int]]:
-    """The square of the errors g of the gains in a part left out, and the number of gains:
+    """The square of the errors g of the gains in a part left out, and the number of gains that it shows (the
+    rank of F' F):
 
         g = (F' F)^-1 F' e,    square = g' ((F' F)^-1 + S)^-1 g = (F' e)' (1 + S F' F)^-1 g
 
@@ -124,8 +126,8 @@ def _gain_errors(fold: Fold, window_s: float | None = None, loudness: float = 1.
 
 
 def squared_deviations(fold: Fold) -> Floats:
-    """Squared error of the gain of each group in a flight left out, less the part that the noise causes,
-    (G,); nan for a group whose effect the flight does not show."""
+    """Squared error of the gain of each group in a flight left out, less the part that the noise causes, at
+    least 0, (G,); nan for a group whose effect is unknown or that the flight does not show."""
     F, e = _standardized(fold.model, fold.innovations())
     F = F.sum(axis=3)
     squares = np.full(F.shape[2], np.nan)

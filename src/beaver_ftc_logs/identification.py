@@ -1,6 +1,7 @@
 """Identify a vehicle: prepare its flights, fit a model to them, and test the model on parts left out.
 
-Z, y, e     regressors (n, m) and rates (n, 3) of a fit, rad/s, and its residual (n, 3), rad/s
+Z           regressors (n, m) of a fit (`orders.stack_data`)
+y, e        rates (n, 3) of a fit, and its residual (n, 3), rad/s
 C           coefficients of a fit (m, 3)
 ma          moving average of the noise, 1 first; a flight is *whitened* by it (`samples.whiten_samples`)
 V, V0       airspeed, m/s, and the airspeed at which a command has the effect of the model, m/s
@@ -85,6 +86,7 @@ def add_unseen_noise(model: Model, flights: Sequence[Samples]) -> Model:
     if not model.colours:
         return model
     known = [tuple(noise.average) for noise in model.colours]
+    # The covariance of a whitened residual is the density of the noise at 0 Hz.
     quietest = min((np.array(noise.noise) for noise in model.colours), key=np.linalg.det)
     powers = [noise.quick for noise in model.colours if noise.quick is not None]
     shared_fields: Document = {
@@ -105,11 +107,12 @@ def add_unseen_noise(model: Model, flights: Sequence[Samples]) -> Model:
 
 
 def assume_law_and_air(flights: Sequence[Samples], vehicle: Vehicle) -> tuple[Vehicle, list[str]]:
-    """The vehicle with the keys `other_laws` and `moving_air` that its file leaves out, and a line on each.
+    """The vehicle with the keys `other_laws` and `moving_air` that its file leaves out, a line on each, and a
+    line if there is no reference airspeed.
 
-    Healthy flights show neither which law nor which air a later flight has, so both keys become true. An
-    alarm then needs more evidence, but is not false. If labels show faults, later flights are assumed to be
-    as these: both become false.
+    Flights without labels show neither which law nor which air a later flight has, so both keys become true.
+    An alarm then needs more evidence. If a flight has labels, later flights are assumed to be as these: both
+    become false.
     """
     labelled = any(np.isfinite(flight.labels).any() for flight in flights)
     reason = "labels show faults under it" if labelled else "logs of healthy flight do not tell"
@@ -136,13 +139,13 @@ def whiten_flights(flights: Sequence[Samples], vehicle: Vehicle) -> list[Samples
     noise to the surfaces [Ljung1999, section 13.4]. The moving averages follow from the residuals of one
     common fit to all flights, and this fit follows from the moving averages:
 
-        1. the first averages: for each flight the likeliest by a fit to this flight alone
+        1. the first averages: for each flight the likeliest by fits to this flight alone, one an average
         2. a common fit to all flights, whitened by their averages
         3. for each flight the likeliest average by the residual of the common fit; stop if none has changed
-        4. whiten again, with weights that give all flights the same noise; continue with step 2,
-           for at most _MAX_ROUNDS rounds
+        4. whiten again, with weights that give all flights the same noise (they are 1 before); continue with
+           step 2, for at most _MAX_ROUNDS rounds
 
-    Likelihoods are those of `_likeliest_ma`.
+    Likelihoods are those of `_likeliest_ma`. Raises BadInput if a flight has fewer than 2 samples for a fit.
 
     own_residuals, common_residuals: for each flight, moving average -> residual, by step 1 and 3. averages:
     the moving average of each flight.
@@ -155,7 +158,8 @@ def whiten_flights(flights: Sequence[Samples], vehicle: Vehicle) -> list[Samples
         """Regressors and rates of flights for the largest order of the rates."""
         # The commands have as many lags as the rates, not their largest number: the kept results depend on
         # it.
-        return orders.stack_data(orders.fit_parts(flights), vehicle, *[max(orders.RATE_LAGS)] * 2)[:2]
+        h = max(orders.RATE_LAGS)
+        return orders.stack_data(orders.fit_parts(flights), vehicle, h, h)[:2]
 
     def own_residual(flight: Samples, ma: tuple[float, ...]) -> Floats:
         """Residual (n, 3) of the fit to one flight, whitened by a moving average."""
@@ -191,8 +195,8 @@ def _likeliest_ma(residuals: dict[tuple[float, ...], Floats]) -> tuple[float, tu
     """For the likeliest moving average: log det R of the residual's covariance R, and this average.
     residuals: moving average -> residual (n, 3) of a flight that was whitened by it.
 
-    Whitening by C(1) / C(z) multiplies the noise by C(1) = sum of the average. So the likeliest average has
-    the least log det R - 6 log C(1): the variance of each of the 3 axes is multiplied by C(1)^2.
+    Whitening by ma(1) / ma(z) multiplies the noise by ma(1), the sum of the average. So the likeliest average
+    has the least log det R - 6 log ma(1): the variance of each of the 3 axes is multiplied by ma(1)^2.
     """
     log_dets = {ma: float(np.linalg.slogdet(np.cov(e.T))[1]) for ma, e in residuals.items()}
     best = min(log_dets, key=lambda ma: log_dets[ma] - 6.0 * float(np.log(sum(ma))))
@@ -200,9 +204,10 @@ def _likeliest_ma(residuals: dict[tuple[float, ...], Floats]) -> tuple[float, tu
 
 
 def expect_another_day(folds: list[Document], model: Model) -> Document:
-    """The errors to expect on a day that was not fitted: mean and worst score of the parts left out, the rate
-    of false alarms with its bounds, 1/h, and the minutes of healthy flight that are missing to show this rate
-    without a fitted tail. The worst of `mean_error` is the largest, of all other scores the least.
+    """The errors to expect on a day that was not fitted: mean and worst score of the parts left out. The
+    worst of `mean_error` is the largest, of all other scores the least. If a rate of false alarms is
+    requested and the model has a tail, also: the rate with its bounds, 1/h, the minutes of healthy flight
+    that are missing to show this rate without a fitted tail, and the test of the threshold (`validation`).
     """
     scores = [fold["score"] for fold in folds if "score" in fold]
     scores_by_key = {key: [score[key] for score in scores] for key in SCORES if scores}
@@ -224,12 +229,13 @@ def expect_another_day(folds: list[Document], model: Model) -> Document:
 
 
 def scale_if_better(flights: Sequence[Samples], vehicle: Vehicle) -> tuple[Sequence[Samples], Vehicle]:
-    """The flights with commands times (V / V0)^2, and the vehicle with V0, if this factor explains decisively
-    more; otherwise both as they are.
+    """The flights scaled with V / V0 (`scale_by_airspeed`, with the power 2), and the vehicle with V0, if
+    this explains decisively more; otherwise both as they are, as if the file states V0 or no airspeed is
+    known.
 
-    Where other laws may fly, each group of surfaces has the power of V / V0 that explains most; another power
-    than 2 must explain decisively more. V0: median of the known airspeeds. lowest: criterion that a power
-    must undercut.
+    Where other laws may fly, each group of surfaces in turn takes another power if the criterion is then less
+    than `lowest`: at first that of the power 2 less _DECISIVE_BIC, later that of the powers taken so far. V0:
+    median of the known airspeeds.
     """
     V = np.concatenate([flight.airspeed for flight in flights])
     V = V[np.isfinite(V)]
@@ -258,8 +264,8 @@ def scale_if_better(flights: Sequence[Samples], vehicle: Vehicle) -> tuple[Seque
 def _scaled(
     flights: Sequence[Samples], vehicle: Vehicle, white: Sequence[Samples] | None = None
 ) -> list[Samples]:
-    """The flights with the command of each surface times its power of V / V0; if flights `white` are given,
-    each is also whitened as its counterpart in `white`.
+    """The flights by `scale_by_airspeed`, with the powers of the vehicle; if flights `white` are given, each
+    is also whitened as its counterpart in `white`.
     """
     V0 = vehicle.reference_airspeed_mps or 0.0
     powers = vehicle.surface_airspeed_powers
@@ -279,7 +285,7 @@ def _min_bic(flights: Sequence[Samples], vehicle: Vehicle) -> float:
 
 
 def check_explained(folds: list[Document], parts: Parts, model: Model) -> None:
-    """Raise BadInput if, on parts left out, the model predicts a rate less well than the mean of the rate
+    """Raise BadInput if, on parts left out, the model predicts a rate no better than the mean of the rate
     does. The message also names the time, the stillest command and the remarks on the rates.
 
     shares: explained share of the variance of p, q and r in each part; means: their means, weighted by

@@ -2,9 +2,10 @@
 
 A loss of effectiveness d of group g changes the rates of a sample by -d F_g, so a sample has the information
 F_g' F_g about d. `_own_information` is the part of it that neither trim nor other groups explain. On average,
-a loss shows after the time T for which d^2 J T / 2 exceeds the prior odds against this loss.
+a loss shows after the time T for which d^2 J T / 2 exceeds the log odds of `_alarm_odds`.
 
-    F       response of each group in standard deviations of the noise (n, G, 3), n samples, G groups
+    F       response of each group in standard deviations of the noise, times the root of the information of a
+            sample, `power` (n, G, 3), n samples, G groups
     J       information about one group, 1/s
     d, T    loss of effectiveness, and time in which it shows, s
 """
@@ -78,10 +79,11 @@ def _own_information(F: Floats, g: int) -> float:
 
 
 def _alarm_odds(model: Model, bank: HypothesisBank, g: int, dt_s: float) -> float:
-    """Log odds that the evidence for a loss of this group must exceed to reach the alarm's probability, for
-    the median of its levels; inf if the bank has no such loss.
+    """Log odds that the evidence for a loss of this group must exceed to reach the probability `alarm` of the
+    settings, also if these have a threshold of the evidence; inf if the bank has no such loss.
 
-    log(alarm / (1 - alarm)) - log(p),    p: probability that a sample begins a loss of the median level
+    log(alarm / (1 - alarm)) - log(p),    p: probability that a sample begins a loss with the median share of
+                                          all hypotheses in which this group loses effectiveness
     """
     settings = model.settings
     shares = bank.transition_share[bank.is_fault_of_group(g)]

@@ -44,11 +44,12 @@ class Regression:
 def fit_ols(Z: Floats, y: Floats, stretch: Ints, lag: int) -> Regression:
     """Ordinary least squares of the rates y (n, 3) on Z (n, m), with Newey-West standard errors:
 
-        X = Z / s,   P = (X' X)^+,   b = P X' y,   e = y - X b,   R = e' e / (n - m)
+        X = Z / s,   P = (X' X)^+,   b = P X' y,   e = y - X b,   R = e' e / max(n - m, 1)
 
     stretch (n,): number of the gap-free stretch of each row; the standard errors use products of residuals
-    that are up to `lag` samples apart, within one stretch only. Where the columns of Z depend on one another,
-    b is the smallest of all solutions; a column that is only rounding gets 0.
+    that are up to `lag` samples apart, within one stretch only. The coefficients of Z are b / s. Where the
+    columns of Z depend on one another, b is the smallest of all solutions; a column that is only rounding
+    gets 0.
     """
     rms = rms_of_columns(Z)
     s = np.where(rms > _RANK_TOLERANCE * rms.max(), rms, np.inf)
@@ -94,8 +95,9 @@ def left_by(Z: Floats, y: Floats) -> Floats:
 
 
 def noise_scale(e2: Floats) -> float:
-    """Scale of the variance of the noise, by the squares (3 n,) of a whitened residual. Faults of few samples
-    do not change it, because it is the median of the sums over three axes, over that of chi-squared."""
+    """Scale of the variance of the noise, by the squares of a whitened residual (3 n,) or (n, 3). Faults of
+    few samples hardly change it, because it is the median of the sums over three axes, over that of
+    chi-squared."""
     return float(np.median(e2.reshape(-1, 3).sum(axis=1)) / _MEDIAN_CHI2)
 
 

@@ -60,7 +60,8 @@ def fit_parts(flights: Sequence[Samples]) -> list[FitPart]:
 
 def usable_mask(samples: Samples) -> Mask:
     """Which samples are known to be healthy, or faulty by a known amount, (n,): those before the first logged
-    failure and, if a surface has labels, those with all these labels, away from their changes."""
+    failure and, if a surface has labels, those with all these labels, away from their changes and from the
+    ends of the flight, in stretches of at least MIN_LABEL_S."""
     first_s = min((failure.t_s for failure in samples.logged_failures), default=np.inf)
     usable = samples.t_s < first_s - _FAILURE_MARGIN_S
     labelled = np.isfinite(samples.labels).any(axis=0)
@@ -142,7 +143,7 @@ def fitted_order(parts: Parts, vehicle: Vehicle, h: int, L: int) -> tuple[least_
 
 def fit_order(parts: Parts, vehicle: Vehicle, h: int, L: int) -> least_squares.Regression:
     """Least squares of a given order over all flights. Raises BadInput if they have fewer than ten samples a
-    coefficient, or if a rate does not move."""
+    coefficient of an axis, or if a rate does not move."""
     Z, y, stretch = stack_data(parts, vehicle, h, L)
     if len(y) < 10 * Z.shape[1]:
         allowed = f"at least {10 * Z.shape[1]} to fit {Z.shape[1]} coefficients an axis"
@@ -156,7 +157,8 @@ def fit_order(parts: Parts, vehicle: Vehicle, h: int, L: int) -> least_squares.R
 
 def stack_data(parts: Parts, vehicle: Vehicle, h: int, L: int) -> tuple[Floats, Floats, Ints]:
     """Regressors Z (n, m), rates y (n, 3) and number of the gap-free run (n,) over all flights, each sample
-    times the weight of its flight. Every order leaves out the same first samples, so that all have equal n.
+    times the weight of its flight. Every order leaves out the same first samples of a flight; after a gap, a
+    larger order leaves out more.
 
     Columns of the regressors: one, the past, the commands of each group by lag.
     """
@@ -238,14 +240,15 @@ def _with_errors(alike: Parts, model: Model, noise: NoiseModel) -> NoiseModel:
     """The noise model of some flights with two more fields:
 
         misreads (G,)   share by which a fit may misread the effect of each group: largest / sqrt(3), the
-                        standard deviation of an error that is uniform between plus and minus the largest
+                        standard deviation of an error that is uniform between plus and minus the largest,
+                        which is at most GAIN_SD_CAP
         quick           power of the quick part of the responses that the flights exceed in a tenth of their
                         samples, in variances of the noise
 
     The part of a residual that the past predicts is no noise: the model lacks it. A law that feeds it back to
     the surfaces makes it look like their effect. Let q be the power of this part on an axis and p that of the
     effect, both in variances of the noise. The effect is then misread by at most the share sqrt(q / p). Least
-    squares weighs the axes by p, so over all axes the share is at most sqrt(sum q p) / sum p.
+    squares weighs the axes by p: with independent errors of the axes, the share is sqrt(sum q p) / sum p.
     """
     flights = [part.innovations(model.model_copy(update={"colours": [noise]})) for part in alike]
     r = np.diag(np.array(noise.noise))
@@ -263,7 +266,7 @@ def centred(values: Floats) -> Floats:
 
 
 def tied_shares(parts: Parts, model: Model) -> Floats:
-    """Share of the effect of each group on the rates that past, signals and the other groups explain, (G,):
+    """Share of the effect of each group on the rates that the other columns of the fit explain, (G,):
 
         f = U_g B_g W less its mean,   u = f - Z b,   share = max(1 - mean |u|^2 / min(mean |f|^2, cap), 0)
 
@@ -271,8 +274,8 @@ def tied_shares(parts: Parts, model: Model) -> Floats:
     noise, and the part that the other columns Z of the fit do not explain. cap: _EFFECT_POWER_CAP.
 
     If the share is near 1, the law ties the group to the quantities that it controls, and its effect is not
-    identifiable. The share is 1 if the group never moved. If the effect is far above the noise, the power of
-    the unexplained part decides alone, because of the cap.
+    identifiable. The share is 1 if mean |f|^2 is at most _MIN_EFFECT_POWER: the group never moved. If the
+    effect is far above the noise, the power of the unexplained part decides alone, because of the cap.
     """
     Z, _, _ = stack_data(parts, model.vehicle, model.history, model.lags)
     B = np.array(model.response)
@@ -289,7 +292,7 @@ def tied_shares(parts: Parts, model: Model) -> Floats:
 
 
 def group_gain_sd(fit: least_squares.Regression, model: Model) -> Floats:
-    """Standard error of the gain of each group, (G,), with the colour of the residual; at most GAIN_SD_CAP.
+    """Standard error of the gain of each group, (G,), from Newey-West standard errors; at most GAIN_SD_CAP.
 
         s (L, 3)    standard errors of the group's coefficients, in standard deviations of the noise
         C (L, L)    correlation of their errors

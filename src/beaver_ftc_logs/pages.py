@@ -103,7 +103,8 @@ def _log_notes(samples: Samples) -> list[str]:
 
 
 def flight_figure(samples: Samples, rows: LogRows, words: Words) -> Any:
-    """The flight on one page: commands, rates, effectiveness with bounds, probability of a fault."""
+    """The flight in panels, from the top: rates, commands, probability of a fault, and for each surface its
+    effectiveness with bounds."""
     surfaces = words.surfaces
     heights = [1.2, 1.2, *[1.0] * (len(surfaces) + 1)]
     height = 3.4 + 1.25 * len(surfaces)

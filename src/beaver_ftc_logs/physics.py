@@ -55,7 +55,8 @@ class AngleFit:
 
 
 def fit_angle(gyros: Sequence[Column], angles: Sequence[Column | None], axis: int) -> AngleFit | None:
-    """Fit the angle of an axis to the rates; None if too little moves, or if this angle or roll is not known.
+    """Fit the angle of an axis to the rates; None if too little moves, if fewer than _MIN_WINDOWS windows
+    remain, or if this angle or roll is not known.
 
     Rates and angles are in the units of the log, all rates in one unit. Without a pitch angle, theta is 0.
     Where the nose is steep, roll and yaw are hard to distinguish: such windows are left out for both.
@@ -96,9 +97,10 @@ def _changes_by_window(
 
         y = angle(b) - angle(a),   X = S(b) - S(a)
 
-    A window with a gap or without a number is left out. circle: a full circle in the unit of the angle, and y
-    is then the change within half a circle; None for pitch, which does not go round. With a circle, windows
-    in which the pitch angle theta (n,) is steep are left out too.
+    A window with a gap, or without a number of the angle at an end, is left out; a rate without a number
+    counts as 0. circle: a full circle in the unit of the angle, and y is then the change within half a
+    circle; None for pitch, which does not go round. With a circle, windows in which the pitch angle theta
+    (n,) is steep are left out too.
     """
     h = np.diff(t)
     means = [np.nan_to_num(0.5 * (term[1:] + term[:-1])) for term in terms]
@@ -118,7 +120,8 @@ def _changes_by_window(
 
 
 def _fit_first_term(y: Floats, X: Floats) -> tuple[float, float] | None:
-    """Slope and correlation of y (w,) with the first column of X (w, m); None if too little moves:
+    """Slope and correlation of y (w,) with the first column of X (w, m); None if too little moves, or if w is
+    less than _MIN_WINDOWS:
 
         y = X beta + error,   v = y - X[:, 1:] beta[1:],   x = X[:, 0]
         slope = sign(x' v) sqrt(v' v / x' x),   correlation = x' v / sqrt(x' x v' v)
@@ -256,8 +259,9 @@ def _factor_remark(fit: AngleFit, rate: str, angle: str) -> str | None:
     """Text of a mistake in a rate or its angle by the slope, with the factor that fits; None if there is
     none. rate, angle: names of their columns.
 
-    Either may be wrong: the angle if it exceeds a full circle; otherwise the rate if no vehicle turns so
-    fast; otherwise the text offers both.
+    A slope near -1 is a wrong sign. Otherwise either may be wrong: the angle if it exceeds a full circle;
+    else the rate if no vehicle turns so fast; else the text offers both. There is no text if they hardly
+    correlate.
     """
     slope = abs(fit.slope)
     is_near_one = 1.0 / _SLOPE_FACTOR < slope < _SLOPE_FACTOR

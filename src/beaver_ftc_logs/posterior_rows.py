@@ -7,7 +7,7 @@ a           effectiveness of each group (n, G), with bounds low and high
 faulty      whether the alarm stands (n,), 0 or 1
 alarmed     whether the evidence is enough for an alarm (n,)
 nameable    whether it is enough for a name (n,)
-calm        whether no fault, or no response to any command, has a probability above 1/2 (n,)
+calm        whether `healthy` and `nothing answers` have in sum a probability above 1/2 (n,)
 """
 
 import numpy as np
@@ -22,11 +22,12 @@ from beaver_ftc_logs.recording import MIN_DIVISOR, Floats, Ints, Mask
 from beaver_ftc_logs.runs import last_true_row
 from beaver_ftc_logs.samples import Samples
 
-# A group is named if the probability of its faults exceeds this share of the probability of any fault.
+# Without `one_group`: a group is named if the probability of its faults exceeds this share of that of any
+# fault.
 _NAME_SHARE = 0.5
-# Largest probability that the name leaves out the surface at fault: if the model is right, the likelihood
-# ratio of another group to the true one exceeds 1 / 0.001 with at most this probability (Markov's
-# inequality).
+# Largest probability that the name ever leaves out the surface at fault, if the model is right and all groups
+# are equally probable at first: the likelihood ratio of another group to the true one ever exceeds the
+# inverse with at most this probability (Ville's inequality).
 _EXCLUSION_RISK = 0.001
 # If the probability that nothing answers the commands is larger, there is no verdict on any surface.
 NO_RESPONSE_LIMIT = 0.5
@@ -36,14 +37,16 @@ def rows_of_posterior(
     samples: Samples, model: Model, bank: HypothesisBank, P: Floats, mass: float | None = None
 ) -> LogRows:
     """The rows that follow from the probabilities P (n, H). mass: probability inside the bounds; that of the
-    model's settings if None.
+    model's settings if None or 0.
 
                     threshold mu of the evidence       no threshold
         alarmed     Page's sum >= mu, and not calm     p_fault >= alarm
         nameable    the same with mu_name              as alarmed
 
-    mu, mu_name: evidence for an alarm and for a name, natural logarithm of odds; p_fault (n,): probability of
-    any fault; alarm: of the settings. Alarm and name stand until a calm row (`_latched`).
+    mu, mu_name: evidence for an alarm and for a name, natural logarithm of odds, also the limits of the sums;
+    p_fault (n,): probability of any fault; alarm: of the settings. Alarm and name stand until a calm row
+    (`_latched`). Under other laws, the upper bound is 1 without an alarm. start: last row in which Page's sum
+    is 0, or the first row.
     """
     p_fault = P[:, bank.is_fault_hypothesis].sum(axis=1)
     calm = P[:, 0] + P[:, -1] > 0.5
@@ -58,7 +61,7 @@ def rows_of_posterior(
     faulty = _latched(alarmed, calm).astype(np.int64)
     start = np.maximum(last_true_row(evidence <= 0.0), 0)
     a, low, high = _effectiveness(model, bank, P, mass or model.settings.bounds)
-    if model.vehicle.other_laws:  # health is not excluded before an alarm excludes it
+    if model.vehicle.other_laws:  # only an alarm excludes health
         high[faulty == 0] = 1.0
     return LogRows(
         t_s=samples.t_s,
@@ -74,7 +77,8 @@ def rows_of_posterior(
 
 def _effectiveness(model: Model, bank: HypothesisBank, P: Floats, mass: float) -> tuple[Floats, ...]:
     """The median effectiveness of each group, and bounds with the probability `mass` between them, (n, G)
-    each. Where nothing answers the commands, the effectiveness is 1 and the bounds are 0 and 1."""
+    each, if something answers. Where the probability that nothing answers exceeds NO_RESPONSE_LIMIT, the
+    effectiveness is 1 and the bounds are 0 and 1."""
     p_silent = P[:, -1]
     P_live = P[:, :-1] / np.maximum(1.0 - p_silent, MIN_DIVISOR)[:, None]
     per_group = [_group_bounds(bank, P_live, g, model, mass) for g in range(len(model.groups))]
@@ -91,8 +95,8 @@ def _group_bounds(
 ) -> tuple[Floats, ...]:
     """The median effectiveness of a group, and bounds with the probability `mass` between them, (n,) each.
 
-    If surfaces move together, one of them may have lost everything and the others nothing: the bounds of a
-    group of several surfaces with a loss are then 0 and 1.
+    If surfaces move together, one of them may have lost everything and the others nothing. The upper bound of
+    a group of several surfaces is therefore 1, and the lower one 0 unless 1 is the only level within bounds.
     """
     levels, p = _group_levels(bank, P_live, g)
     if model.vehicle.other_laws:  # all levels are equally probable before the flight
@@ -123,7 +127,7 @@ def _group_levels(bank: HypothesisBank, P_live: Floats, g: int) -> tuple[Floats,
 
 def _credible_bounds(levels: Floats, p: Floats, mass: float) -> tuple[Floats, Floats]:
     """Low and high (n,): the range of the most probable levels, as few as have the probability `mass` in sum,
-    half a step wider on both sides. levels (L,), p (n, L)."""
+    half a step wider on both sides, but within 0 and 1. levels (L,), p (n, L)."""
     order = np.argsort(-p, axis=1, kind="stable")
     ranked = np.take_along_axis(p, order, axis=1)
     chosen = np.cumsum(ranked, axis=1) - ranked < mass
@@ -136,11 +140,13 @@ def _credible_bounds(levels: Floats, p: Floats, mass: float) -> tuple[Floats, Fl
 
 def _surfaces_at_fault(model: Model, bank: HypothesisBank, P: Floats, faulty: Ints, nameable: Mask) -> Names:
     """The named surfaces of each row, (n,): those of the likely groups (`_likely_groups`). While the alarm
-    stands, a row without a name is `unknown`. The name of the row before stays
+    stands, a row without a name is `unknown`. The first row of an alarm takes its new name. Later the old
+    name stays if one of these is true:
 
-        if an unknown offset is likelier than a fault of known surfaces; or, if it is not `unknown`,
-        if the new name has stood for less than `rename_s`,
-        if, with `one_group`, the new name has all its surfaces and more, or is `unknown`.
+        1. an unknown offset is likelier than a fault of known surfaces
+        2. the old name is not `unknown`, and the new name has stood for less than `rename_s`
+        3. the old name is not `unknown`, `one_group` is set, and the new name is `unknown` or contains all
+           surfaces of the old one: an excluded surface stays excluded
 
     names (n,): by the probabilities of each row alone; named (n,): the result. new: name of this row by
     `names`; old: name of the row before by `named`; n_same: number of rows directly before that have the same
@@ -157,9 +163,8 @@ def _surfaces_at_fault(model: Model, bank: HypothesisBank, P: Floats, faulty: In
         new = names[k] or UNKNOWN_SURFACE
         old = named[k - 1] if k else ""
         n_same = n_same + 1 if k and new == (names[k - 1] or UNKNOWN_SURFACE) else 0
-        # An excluded surface stays excluded: Ville's inequality bounds the probability of a wrong exclusion.
-        named_again = new == UNKNOWN_SURFACE or set(old.split("+")) <= set(new.split("+"))
-        waits = n_same < n_hold or (model.settings.one_group and named_again)
+        excludes_none = new == UNKNOWN_SURFACE or set(old.split("+")) <= set(new.split("+"))
+        waits = n_same < n_hold or (model.settings.one_group and excludes_none)
         keeps = old and (offset[k] or (old != UNKNOWN_SURFACE and waits))
         named[k] = old if keeps else new
     return named
@@ -169,8 +174,8 @@ def _likely_groups(model: Model, bank: HypothesisBank, P: Floats, p_fault: Float
     """The groups (n, G) that the name of a row may have.
 
     one_group   groups
-    false       those whose faults have more than half of the probability p_fault (n,)
-    true        those whose loss is more than _EXCLUSION_RISK times as probable as the likeliest loss;
+    false       those whose faults have more than _NAME_SHARE of the probability p_fault (n,)
+    true        those whose loss alone is more than _EXCLUSION_RISK times as probable as the likeliest loss;
                 none in a row in which these are all of several groups that can have a loss
     """
     faults = [bank.is_fault_of_group(g) for g in range(len(model.groups))]

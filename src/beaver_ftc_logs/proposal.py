@@ -1,8 +1,8 @@
 """Propose a vehicle file for a log: which columns are rates, commands and angles, and in which unit.
 
 The name of a column shows which quantity it is (`known_quantities`). Its unit follows from the name, from the
-size of its numbers, and from mechanics: the integral of p is the change of roll, the mean of the acceleration
-is 1 g.
+size of its numbers, and from mechanics: the integral of p is the change of roll, the median magnitude of the
+acceleration along z is 1 g.
 """
 
 import re

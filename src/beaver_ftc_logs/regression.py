@@ -13,7 +13,7 @@
     B, F            response (G, L, 3), rad/s; effect of the healthy groups (n, G, 3), rad/s
     y               rates that the past leaves unexplained (n, 3), rad/s
     e, R, W         residual (n, 3), rad/s; its covariance (3, 3), (rad/s)2; whitening matrix: e W is white
-    Z, v            whitened regressors of c and a (3 n, 3 + G), whitened y (3 n,): three rows a sample
+    Z, v            whitened regressors of trim and a (3 n, 3 + G), whitened y (3 n,): three rows a sample
     ma              moving average of the noise, 1 first
     p, ar           number of residuals that predict the next; matrices of this prediction (p, 3, 3), the
                     latest residual first
@@ -185,7 +185,7 @@ class Innovations:
         return low[3:], high[3:], least_squares.noise_scale(r2)  # the first 3 are the trim
 
     def gains(self) -> Floats:
-        """The gain of each response, (G,), by least squares of y on trim and responses."""
+        """The gain of each response, (G,), by least squares of v on Z (`regression`)."""
         return np.asarray(np.linalg.lstsq(*self.regression(), rcond=None)[0][3:])
 
     def quick_power(self, rate_hz: float) -> Floats:

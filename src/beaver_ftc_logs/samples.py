@@ -38,7 +38,7 @@ from beaver_ftc_logs.vehicle import QuantityColumn, Vehicle
 _MAX_NUMBER = 1e6  # a larger number in a log is damaged
 _MAX_RATE_RAD_S = 60.0  # larger rates are in another unit
 _MAX_RATE_SD_RAD_S = 3.0  # a larger standard deviation of a rate causes a remark
-# Limits of the dynamic pressure that scales a command, over that at the reference airspeed.
+# Limits of the dynamic pressure, over that at the reference airspeed, in `scale_by_airspeed`.
 _QDYN_RATIOS = (0.1, 10.0)
 # Moving averages of the noise. A gust that is held within a sample adds to the next one (positive
 # coefficients), the noise of a gyro subtracts from it (negative ones).
@@ -46,10 +46,10 @@ NOISE_MA_CANDIDATES = (
     (1.0,), (1.0, 0.5),
     *((1.0, -2.0 * c, c**2) for c in (0.2, 0.4, 0.5, 0.6, 0.7, 0.8, 0.85, 0.9)),
 )  # fmt: skip
-UNFITTED_MA = NOISE_MA_CANDIDATES[:2]
 # Noise that is tried even if no fitted flight had it: the moving averages of gusts, and the noise of gyros
 # from that of a laboratory to that of a toy, in steps of a factor of 3.2, so that none is more than 1.8 times
 # off.
+UNFITTED_MA = NOISE_MA_CANDIDATES[:2]
 UNFITTED_GYROS_RAD_S = tuple(np.geomspace(1e-5, 1e-2, 7).tolist())
 
 
@@ -60,7 +60,8 @@ class Samples:
     t_s: (n,) s, the log's own stamps, or an even grid within each stretch of a log that is faster than the
         vehicle's largest sample rate
     rates: (n, 3), rad/s
-    commands: (n, S), command of each surface as the mixer makes it, in shares of travel
+    commands: (n, S), command of each surface as the mixer makes it, in shares of travel, scaled by the
+        airspeed if the vehicle has a reference airspeed
     signals: (n, X)
     labels: (n, S), effectiveness, nan where it is unknown
     stretch_number: (n,), number of the gap-free stretch
@@ -72,6 +73,7 @@ class Samples:
     energy_height_rate_mps: (n,), rate of the energy height over the last seconds, nan where it is unknown
     notes: remarks on the reading
     unchanged_s: for how long each column of rates, commands and signals has been constant, (n,) s
+    logged_failures: failures that the log states
     noise_ma_coefficients: moving average of the noise by which rates, commands and signals are whitened,
         empty if they are not
     fit_weight: weight of each sample in a fit
@@ -191,7 +193,8 @@ def whiten_samples(samples: Samples, C: Sequence[float], fit_weight: float = 1.0
     """The flight with rates, commands and signals x filtered by C(1) / C(z), so that an autoregressive model
     leaves a white residual [Ljung1999, section 4.2]. C: moving average of the noise (1, c1, ...).
 
-    The filter restarts from rest at the first row x0 of each run [begin, end) of known rows without a gap.
+    The filter restarts from rest at the first row x0 of each run [begin, end) of known rows without a gap. A
+    row with an unknown number becomes unknown as a whole.
     """
     from scipy.signal import lfilter
 
@@ -222,8 +225,9 @@ def _defects(log: RecordedFlight, used: list[str], rate_names: list[str]) -> Ite
 
 
 def _check_attitude(log: RecordedFlight, vehicle: Vehicle) -> frozenset[str]:
-    """The columns of rates that the angles confirm. Raises BadInput where rates, angles and gravity
-    contradict one another, with the column that seems to be in another unit."""
+    """The columns of rates that the angles confirm; none if the roll rate is clipped, as angles are then not
+    compared. Raises BadInput where rates, angles and gravity contradict one another, with the column that
+    seems to be in another unit."""
     columns = log.columns
     rates = {name: columns[name] for name in vehicle.rate_columns}
     angles = named_angles(columns, vehicle)
@@ -272,8 +276,8 @@ def mixer_matrix(vehicle: Vehicle) -> Floats:
 
 
 def _mixed_commands(flight: str, logged_commands: Floats, vehicle: Vehicle) -> Floats:
-    """The command of each surface, the weighted sum of the logged commands (n, C), (n, S). Raises BadInput if
-    a weight makes one larger than _MAX_NUMBER."""
+    """The command of each surface (n, S): the weighted sum of the logged commands (n, C). Raises BadInput if
+    the weights make one larger than _MAX_NUMBER."""
     with np.errstate(over="ignore", invalid="ignore"):
         commands: Floats = np.einsum("nc,sc->ns", logged_commands, mixer_matrix(vehicle))
     too_large = (np.isinf(commands) | (np.abs(commands) > _MAX_NUMBER)).any(axis=0)

@@ -1,7 +1,7 @@
 """Step the diagnosis of the control loop through a recorded flight; from its verdicts, the effectiveness of
 each surface.
 
-A loss theta in [-1, 0] explains a frame if |nu_i - theta Z_i| <= eta_bar_i on every axis, as in
+A loss theta in [-1, 0] explains a frame if |nu_i - theta Z_i| <= eta_i on every axis i, as in
 diagnosis/isolation.py. If one surface alone is at fault and its effectiveness is constant for a second, its
 theta is in the intersection of the sets of that second's frames.
 
@@ -111,9 +111,9 @@ def _command_gains(nu: Floats, Z: Floats) -> tuple[Floats, Floats]:
 
 
 def _explaining_losses(nu: Floats, eta: Floats, Z: Floats) -> tuple[Floats, Floats]:
-    """Least and greatest theta (n, S) of a loss with |nu - theta Z| <= eta on every axis of the frame, each
-    in [-1, 0]; the least is above the greatest if no theta fulfils it. On an axis without effect, Z = 0,
-    every theta fulfils it or none.
+    """Least and greatest theta (n, S), within -1 and 0, of a loss with |nu - theta Z| <= eta on every axis of
+    the frame; the least is above the greatest if no theta fulfils it. On an axis without effect, Z = 0, every
+    theta fulfils it or none.
     """
     eta = eta + _TOLERANCE_RAD_S2
     acts = np.abs(Z) > MIN_DIVISOR
@@ -152,10 +152,10 @@ def _bounds(
         verdict                                surface            low          high
         no alarm                               any                alone_low    1
         an alarm, candidates are surfaces      candidate          alone_low    1
-                                               other              1            1
         isolated, type is a loss               isolated           alone_low    alone_high
         isolated, another type or none         isolated           0            1
-        none, or a name that is no surface     any                0            1
+        one of the last three                  other              1            1
+        no candidate, or one is no surface     any                0            1
 
     A fault of another type, or of none, may be no loss.
     """
@@ -178,7 +178,7 @@ def rows_of_replay(t_s: Floats, replay: Replayed, surfaces: Sequence[str], fdi: 
     """The rows of a flight. fdi: this section of the scenario. With the scheme of a rival, or verdicts on
     pairs of surfaces, the bounds are 0 and 1, since `_bounds` assumes that one surface is faulty.
 
-    The estimate of a fault without a type is taken as theta of a loss; its bounds stay 0 and 1.
+    The estimate of a fault without a type is taken as theta of a loss, within its bounds, which stay 0 and 1.
     """
     faulty = np.array([verdict.detected for verdict in replay.verdicts])
     low = np.zeros_like(replay.alone_low)

@@ -1,9 +1,9 @@
 """Which rows of a flight are credible, and of which groups of surfaces a model knows the effect.
 
-`FittedRanges` has the ranges in which a model was fitted. A row is credible if the commands, the rates and
-the airspeed of the last seconds are in these ranges, and no signal is frozen or clipped. Other rows have no
-name, and bounds of 0 and 1. The size of the residual does not count, since a fault makes it large too.
-Whether a row is credible depends on no later row.
+`FittedRanges` has the ranges in which a model was fitted. A row is credible if commands, rates and airspeed
+were in these ranges, but for a margin, in at least half of the last seconds, no column is frozen, and no rate
+was clipped lately. Other rows have no alarm, no name, and bounds of 0 and 1. The size of the residual does
+not count, since a fault makes it large too. Whether a row is credible depends on no later row.
 
 The word *judged* after a constant means that we chose it by judgement, *derived* that it follows from others.
 """
@@ -81,7 +81,8 @@ def central_ranges(values: Floats) -> list[list[float]]:
 
 
 def known_effects(model: Model) -> Mask:
-    """Whether the effect of each group is known, so that there can be a verdict on it, (G,)."""
+    """Whether the effect of each group is known, so that there can be a verdict on it, (G,); all are if the
+    model file states no tied shares."""
     return np.array(model.fitted.tied or [0.0] * len(model.groups)) < _MAX_TIED_SHARE
 
 
@@ -120,8 +121,8 @@ def untrusted_rows(samples: Samples, model: Model) -> Reasons:
 
 
 def _rows_out_of_range(samples: Samples, model: Model) -> Reasons:
-    """Reason -> rows (n,) in which a command, a rate or the airspeed was outside its range for most of the
-    last _RANGE_WINDOW_S, or of the flight so far if that is shorter."""
+    """Reason -> rows (n,) in which a command, a rate or the airspeed was outside its range, by more than its
+    margin, for most of the last _RANGE_WINDOW_S, or of the flight so far if that is shorter."""
     ranges = model.fitted
     commands = [f"command of {surface}" for surface in model.vehicle.surfaces]
     channels = [

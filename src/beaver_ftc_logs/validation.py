@@ -29,10 +29,11 @@ _COVERAGE_GOAL = 0.93
 
 
 def add_ranges_and_threshold(parts: Parts, model: Model) -> Model:
-    """The model with the ranges in which it was fitted, and with the threshold of the alarm. At this
-    threshold, parts left out would alarm as often as the vehicle file requests. Without a request, the rate
-    is _DEFAULT_FALSE_ALARMS, or there is no threshold if labels show faults (settings.levels). Raises
-    BadInput if a rate is requested and the parts are too short to estimate it.
+    """The model with the ranges in which it was fitted, with the threshold of the alarm, and with the test of
+    this threshold as `identified`. At this threshold, parts left out would alarm at most as often as the
+    vehicle file requests. Without a request, the rate is _DEFAULT_FALSE_ALARMS, or there is no threshold if
+    labels show faults (settings.levels). Raises BadInput if a rate is requested and the parts have too few
+    peaks to estimate it.
     """
     folds = list(held_out_folds(parts, model))
     peaks = [_healthy_peaks(fold) for fold in folds]
@@ -60,9 +61,10 @@ def add_ranges_and_threshold(parts: Parts, model: Model) -> Model:
 
 
 def _gain_sd(parts: Parts, model: Model, folds: Sequence[Fold]) -> Floats:
-    """Standard error of the gain of each group, (G,), 1 in the model: that of the fit and, under other laws,
-    the root mean square of the deviations in the flights left out. The largest error by which a fit may
-    misread a gain, sqrt(3) times its standard deviation, counts as the deviation of one more flight."""
+    """Standard error of the gain of each group, (G,), 1 in the model, at most GAIN_SD_CAP: that of the fit
+    and, under other laws, the root mean square of the deviations in each of several flights left out. The
+    largest error by which a fit may misread a gain, sqrt(3) times its standard deviation, counts as the
+    deviation of one more flight."""
     variance = group_gain_sd(fit_of(parts, model), model) ** 2
     if model.vehicle.other_laws:
         misreads = [noise.misreads for noise in model.colours] or [[0.0] * len(model.groups)]
@@ -127,9 +129,9 @@ def _healthy_peaks(fold: Fold) -> extremes.PeaksAndHours:
 
 
 def score_folds(parts: Parts, model: Model) -> tuple[list[Document], float]:
-    """An entry with qualities and score for each fold; and the posterior mass of the bounds, out of
-    _CREDIBLE_MASSES, with which their mean share of contained labels is nearest to _COVERAGE_GOAL. Without
-    labels: the usual mass.
+    """An entry with qualities and, with labels, score for each fold; and the posterior mass of the bounds,
+    out of _CREDIBLE_MASSES, with which their mean share of contained labels is nearest to _COVERAGE_GOAL.
+    Without labels: the usual mass.
     """
     entries = fold_qualities(parts, model)
     usual = model.settings.bounds

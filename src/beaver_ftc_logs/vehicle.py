@@ -218,8 +218,8 @@ class Vehicle(Section):
 
     @model_validator(mode="after")
     def _check_names(self) -> "Vehicle":
-        """Refuse names of surfaces that no column may have, names that the file does not define, and wrong
-        units."""
+        """Refuse names of surfaces that no column may have, repeated commands, surfaces that no command
+        moves, names that the file does not define, and wrong units."""
         # The name of a surface becomes a part of names of columns in diagnosis.parquet.
         reason = "a surface's name has letters, digits, - and _ only, allowed: one"
         bad = [name for name in self.surfaces if not _SURFACE_NAME_PATTERN.fullmatch(name)]

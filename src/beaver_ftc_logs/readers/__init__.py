@@ -124,7 +124,7 @@ def split_long_recording(log: RecordedFlight, stamps: Floats, ratio: float) -> I
 
 
 def _select_period(column: Column, begin_s: float, end_s: float) -> Column:
-    """The rows of a column in a period, s, and the last row before it."""
+    """The rows of a column in a period, s, and the last row before it if none is at its begin."""
     first = max(int(np.searchsorted(column.t_s, begin_s, side="right")) - 1, 0)
     end_row = int(np.searchsorted(column.t_s, end_s, side="right"))
     return Column(column.t_s[first:end_row], column.values[first:end_row], column.note)

@@ -27,8 +27,8 @@ def read_parts(
     part_rows: int | None = None,
 ) -> Iterator[RecordedFlight]:
     """The flight in a table. A table of more than LAST_PART_FACTOR times part_rows rows is returned in parts
-    of part_rows rows, so that memory does not grow with the file. The parts are numbered, and each begins
-    with the end of the part before.
+    of part_rows rows, so that memory does not grow with the file; the last part may have up to this many
+    times as many. The parts are numbered, and each begins with the end of the part before.
 
     Cells without a number, and columns that are not read, are nan. time: column of the time and its unit,
     `t_s` in s if None. columns: the columns that are read, all if None. part_rows: if None, the table is one
@@ -54,7 +54,8 @@ def read_parts(
 
 
 def _timed_rows(path: Path, time: str, t_s: Floats, cells: TableCells) -> tuple[Any, list[str]]:
-    """The rows whose time is a number, and a line on the others. time: name of the column."""
+    """The rows whose time is a number, and a line on the others. Raises BadInput if these are more than half.
+    time: name of the column."""
     n_bad = int(np.isnan(t_s).sum())
     if not n_bad:
         return slice(None), []
@@ -84,7 +85,7 @@ def column_names(path: Path) -> list[str]:
 
 
 def first_cells_of_column(path: Path, name: str) -> TableCells:
-    """The first BATCH_ROWS cells of a column, or a few more."""
+    """The first BATCH_ROWS cells of a column, or all if there are at most LAST_PART_FACTOR times as many."""
     return next(_Table(path).parts([name], BATCH_ROWS))[0]
 
 

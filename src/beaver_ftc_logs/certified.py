@@ -1,8 +1,8 @@
 """The certificate of a recorded flight that an aircraft's own model diagnosed.
 
 A certificate refers to columns of residuals and bounds, which a recorded log does not have. So a log with the
-columns of a simulated flight is written with the certificate. It has the first stretch with an alarm, or the
-first stretch of all if there is no alarm.
+columns of a simulated flight is written with the certificate. It has the first stretch with an alarm in a
+credible row, or the first stretch of all if there is none.
 """
 
 from collections.abc import Iterator

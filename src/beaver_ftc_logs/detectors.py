@@ -44,8 +44,8 @@ def _least_squares(samples: Samples, model: Model, fades: bool) -> LogRows:
 
     The sums are over the memory of the detector (`_memory_sums`), b = sum X' r. theta (3 + G,): trim in
     standard deviations of the noise, and a_g - 1. X (n, 3, 3 + G): their whitened effects on the rates. r (n,
-    3): residual of a healthy vehicle. M0: prior information, with a standard deviation of 1/2 for a_g. P:
-    covariance of theta.
+    3): residual of a healthy vehicle. M0: prior information, with a standard deviation of trim_sd for the
+    trim and of 1/2 for a_g. P: covariance of theta.
     """
     flight = innovations(samples, model)
     sd = [*np.sqrt(np.diag(flight.R)), *np.ones(len(model.groups))]

@@ -50,7 +50,8 @@ class LinearRateModel:
 
 def loop_detector_inputs(samples: Samples, model: Model) -> list[tuple[Measured, Floats]]:
     """The inputs of a detector at each row: measurements, and the command u (4,) as shares of travel. The
-    groups of the vehicle are the first columns of Z and u; the other columns are 0.
+    groups of the vehicle are the first columns of Z and u; the other columns are 0. Raises BadInput for more
+    groups than LOOP_SURFACES.
 
     Z (n, 3, 4), rad/s2: the contribution of each surface. If the model cannot predict a row, as after a gap,
     the innovation and Z are 0.
@@ -101,15 +102,16 @@ def loop_detector_context(model: Model) -> Context:
 
 
 def run_loop_detector(detector: Detector, samples: Samples, model: Model) -> LogRows:
-    """Step a detector of the loop through a flight. An alarm lasts while its statistic exceeds 1."""
+    """Step a detector of the loop through a flight, and return its rows (`rows_of_verdicts`)."""
     inputs = loop_detector_inputs(samples, model)
     detector.reset(loop_detector_context(model))
     return rows_of_verdicts([detector.step(*deepcopy(frame)) for frame in inputs], samples, model)
 
 
 def rows_of_verdicts(verdicts: list[Verdict], samples: Samples, model: Model) -> LogRows:
-    """Verdicts as rows. The bounds are 0 and 1 for each surface that the detector may suspect, otherwise 1. A
-    name that is no group of the vehicle becomes `unknown`, and any surface is suspected.
+    """Verdicts as rows. An alarm lasts while the statistic exceeds 1 or, without a statistic, while the
+    verdict is `detected`. The bounds are 0 and 1 for each surface that is then suspected, otherwise both 1. A
+    name that is no group of the vehicle becomes `unknown`, and every surface is suspected.
 
     a, low (n, S): effectiveness and its lower bound; members: the surfaces of each group.
     """

@@ -166,7 +166,7 @@ class NoiseModel(Section):
     """The noise of some flights. Another gyro, other air or another law gives the residual another spectrum.
 
     average: 1, c1, ...: moving average of the noise, newest first
-    noise: covariance of the residual whitened by average, (3, 3), (rad/s)2
+    noise: covariance of the residual whitened by average and predicted by before, (3, 3), (rad/s)2
     before: AR coefficients: the previous residuals predict the next, latest first, (3 L, 3)
     wider: variance inflation: factor on noise, since gains scatter more in held-out parts, and under
     other laws, than the fit states
@@ -201,7 +201,7 @@ class Model(Section):
     response: (groups, lags, 3), a share of command to rad/s a sample
     response_sd: standard errors of `response`, colour included
     noise: covariance of the residual, (3, 3), (rad/s)2
-    colours: noises that flights were seen to have, for `moving_air`
+    colours: noise models for `moving_air`: of the fitted flights, of gusts and of noisier gyros
     fitted: what it was fitted on; null or left out: nothing is known
     identified: what it was found from, and how well
     """

@@ -168,7 +168,8 @@ def stack_data(parts: Parts, vehicle: Vehicle, h: int, L: int) -> tuple[Floats, 
     y = []
     stretches = []
     for i, part in enumerate(parts):
-        X, U, known = regression.build_regressors(part.samples, groups, h, L, True, vehicle.n_signal_lags(h))
+        f = vehicle.n_signal_lags(h)
+        X, U, known = regression.build_regressors(part.samples, groups, h, L, labelled=True, f=f)
         used = part.is_usable & known
         used[:max_lag] = False
         n = len(X)

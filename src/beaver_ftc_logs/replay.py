@@ -47,8 +47,8 @@ def replay_run_log(path: Path) -> tuple[Document, Document]:
 
 
 def _replay_verdict(path: Path, scenario: Any, log: dict[str, Floats], verdicts: list[Any]) -> Document:
-    """The document of verdict.json: times of detection and isolation, and whether they agree with
-    metrics.json and the log of the flight.
+    """The document of verdict.json: times of detection and isolation, whether they agree with metrics.json,
+    and the number of rows whose alarm is not that of the log.
     """
     from beaver_ftc_logs.stepped import named_since
 
@@ -88,7 +88,7 @@ def _lacking_inputs(scenario: Any) -> list[str]:
 
 def _is_as_flown(path: Path, *times_s: float | None) -> bool | None:
     """Whether the times of detection and isolation are those of metrics.json, which are rounded otherwise;
-    None if there is no metrics.json beside the log.
+    None if there is no metrics.json beside the log. Raises BadInput if it cannot be read.
     """
     metrics_path = path.with_name("metrics.json")
     if not metrics_path.is_file():

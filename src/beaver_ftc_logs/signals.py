@@ -70,8 +70,8 @@ def find_spike_rows(values: Floats) -> Ints:
 
 
 def column_defect_texts(name: str, column: Column, is_rate: bool) -> list[str]:
-    """A line for each defect of a column in the whole flight. is_rate: whether it is a rate, not a
-    command."""
+    """A line for each defect of a column in the whole flight. is_rate: whether it is a rate, not a command or
+    a further signal."""
     values = column.values
     texts = [column.note] if column.note else []
     n = int((~np.isfinite(values)).sum())

@@ -74,8 +74,8 @@ def sample_column(column: Column, t_s: Floats, step_s: float) -> tuple[Floats, f
     """The values of a column at given times, and their mean age, s, or None if the column has these very
     times.
 
-    The value is the last one up to the time, nan before the first. If the column is logged much faster, the
-    value is the mean over the step that ends at the time, and half a step old.
+    The value is the last one up to the time, nan before the first. If the column is logged faster, with a
+    step below 0.6 step_s, the value is the mean over the step_s that end at the time, and half of it old.
     """
     if np.array_equal(column.t_s, t_s):
         return column.values, None

@@ -13,7 +13,7 @@ from beaver_ftc_logs.folds import Fold, fold_qualities, held_out_folds
 from beaver_ftc_logs.gains import squared_deviations
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.orders import GAIN_SD_CAP, fit_of, group_gain_sd, tied_shares
-from beaver_ftc_logs.posterior_rows import rows_of_posterior
+from beaver_ftc_logs.posterior_rows import NO_RESPONSE_LIMIT, rows_of_posterior
 from beaver_ftc_logs.recording import Floats
 from beaver_ftc_logs.regression import Parts
 from beaver_ftc_logs.runs import runs_between
@@ -121,7 +121,7 @@ def _healthy_peaks(fold: Fold) -> extremes.PeaksAndHours:
     samples = fold.held_out.samples
     p = bank_posterior(samples, fold.model, bank)
     z = fault_evidence(p, bank)
-    answers = p[:, -1] < 0.5
+    answers = p[:, -1] < NO_RESPONSE_LIMIT
     rows = np.flatnonzero(fold.held_out.is_usable & ~(samples.labels < 1.0).any(axis=1) & answers)
     runs = [page_cusum(z[rows[begin:end]], np.inf) for begin, end in runs_between(np.diff(rows) > 1)]
     peaks = np.concatenate([extremes.peaks_between_zeros(cusum) for cusum in runs])

@@ -5,7 +5,7 @@ a frozen output. It never reads `mavros-rc-out`, whose failed channel stands sti
 outputs are read only for the freeze rule of the benchmark.
 
 Time counts from the first row of `mavros-imu-data_raw`. A fault begins at the first row of a
-`failure_status-*` topic.
+`failure_status-*` topic that has its code.
 """
 
 import json
@@ -48,7 +48,8 @@ def _alfa_names() -> dict[str, dict[str, Any]]:
 
 
 def read(path: Path, _wanted: Any = None) -> RecordedFlight:
-    """The flight in a folder of topics, with all its columns. Raises BadInput if it has none of the gyro.
+    """The flight in a folder of topics, with all its columns. Raises BadInput if it is no folder, or has no
+    topic of the gyro.
 
     _wanted: every reader receives the columns that are wanted; this one reads all of its few topics.
     """
@@ -67,7 +68,7 @@ def read(path: Path, _wanted: Any = None) -> RecordedFlight:
 
 
 def _read_topic_tables(path: Path) -> Iterator[tuple[str, TopicTable]]:
-    """Yield each topic with wanted columns or a failure status, and its table."""
+    """Yield each topic with columns of alfa.json or a failure status, and its table, if it has a stamp."""
     wanted = {topic for topic, _, _ in _alfa_names()["columns"].values()}
     for file in sorted(path.glob("*.csv")):
         topic = file.stem.removeprefix(path.name).removeprefix("-")

@@ -85,7 +85,7 @@ def read_messages(path: Path) -> dict[str, Messages]:
 
 def _binary_messages(data: mmap) -> Iterator[tuple[Any, array]]:
     """Each format with the positions of its messages. A message may precede the message that describes its
-    format, so all formats are read first.
+    format, so all formats are read first. A format whose codes have another length is left out.
     """
     lengths = {_FORMAT_KIND: _FORMAT_BYTES}
     formats = {}

@@ -1,6 +1,6 @@
 """A PX4 log (ULog). A column is named `topic.field`, `topic_1.field` for a second instance of a topic.
 
-Time counts from the first message of the log. Reading needs pyulog: the extra `flights`.
+Time counts from the first message of the topics that are read. Reading needs pyulog: the extra `flights`.
 """
 
 import re

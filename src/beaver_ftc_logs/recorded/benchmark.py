@@ -1,9 +1,9 @@
 """The benchmark on recorded flights: leave one flight out, identify from the others, diagnose the one left
 out.
 
-The data sets of a folder are ENAC's tables with their vehicle file, and ALFA's folders of topics. Every
-setting is fixed before the flight left out is read. Of a single flight, each half is left out in turn, with
-settings fitted to the whole flight. Other detectors are compared with ours.
+The data sets of a folder are ENAC's tables with their vehicle file, and ALFA's folders of topics. Of several
+flights, every setting is fixed before the flight left out is read. Of a single flight, each half is left out
+in turn, with settings fitted to the whole flight. Other detectors are compared with ours.
 """
 
 import json
@@ -130,15 +130,13 @@ def _diagnose_each(log: RecordedFlight, held_out: FitPart, model: Model) -> Iter
 
 
 def settings_of_single(usable: list[FitPart], data: DataSet) -> FilterSettings | None:
-    """The settings for a data set of a single flight, whose halves are judged in turn: levels, rate of
-    changes and mass of the bounds, all fitted to the whole flight, since neither half has all levels. None if
-    there are several flights.
+    """The settings for a data set of a single flight, whose halves are judged in turn: all, such as levels,
+    rate of changes and mass of the bounds, are fitted to the whole flight, since neither half has all levels.
+    None if there are several flights.
     """
     if len(data.flights) > 1:
         return None
     model = fit_model(usable, data.vehicle)
-    if len(usable) > 1:
-        return model.settings
     return model.settings.model_copy(update={"bounds": score_folds(usable, model)[1]})
 
 

@@ -43,7 +43,7 @@ def score_tables(document: Document) -> list[tuple[str, HeaderAndRows]]:
 
 
 def _tables_of_other_days(document: Document) -> list[tuple[str, HeaderAndRows]]:
-    """A title and a table for each data set: every day, then mean and worst of each kind."""
+    """A title and a table for each data set: every day with one change, then mean and worst of each kind."""
     columns = LABEL_COLUMNS | {
         "method": itemgetter("day"),
         "classes by sliding least squares": _share("beside"),
@@ -162,7 +162,7 @@ def _method_titles(data: Document) -> list[str]:
 
 
 def _draw_failure_delays(axis: Any, data: Document) -> None:
-    """Draw a line for each method, with a mark for each failed surface at its delay. The grey area at the
+    """Draw a row for each method, with a mark for each failure of surfaces at its delay. The grey area at the
     right has the failures that were not found within _SHOWN_DELAY_S.
     """
     titles = _method_titles(data)
@@ -182,7 +182,7 @@ def _draw_failure_delays(axis: Any, data: Document) -> None:
 
 
 def _draw_shares(axis: Any, data: Document) -> None:
-    """Draw a line for each method, published ones included, with a mark for each share of the rows that are
+    """Draw a row for each method, published ones included, with a mark for each share of the rows that are
     right."""
     labels = {"classes": "class", "healthy_or_faulty": "healthy or faulty", "side": "side of the aircraft"}
     rows = [*data["rows"], *data["published"]]

@@ -31,6 +31,7 @@ TEST_SEEDS = range(8, 16)
 _RIVAL_DETECTOR = "sliding-least-squares"
 _WORST_OF_SCORE = {"mean_error": max}
 _TRIM_MEAN_S = 30.0  # the running mean over this time is the trim
+_DRIFT_TIME_S = 300.0  # correlation time of the drift of the trim
 
 
 @dataclass(frozen=True)
@@ -105,19 +106,20 @@ def random_days(n: int, seeds: range) -> list[DayChanges]:
 def apply_day_changes(day: DayChanges, samples: Samples, A: Floats, Q: Floats) -> Samples:
     """The flight as it might have been on that day, with commands u (n, S) and rates x (n, 3):
 
-        u <- mean(u) + motion (u - mean(u)) / gain + neutral + (trim + drift) / e
+        u <- mean(u) + motion (u - mean(u)) / gain + neutral + (trim + drift) / e,    u delayed before
         x <- mean(x) + motion (x - mean(x)) + extra noise
+        extra^2 = max(noise_ratio^2 - min(motion, 1)^2, 0)
 
-    mean: running mean over _TRIM_MEAN_S; motion, gain, neutral, trim, drift: of the day; e (n, S):
-    effectiveness. A (3 h, 3): how its model's rates answer their own past, Q (3, 3) (rad/s)2: covariance of
-    its noise. extra: the noise that `motion` leaves out of the day's noise ratio.
+    mean: running mean over _TRIM_MEAN_S; motion, neutral, trim: of the day; gain: common gain times that of
+    each surface; drift: coloured noise, of correlation time _DRIFT_TIME_S; e (n, S): effectiveness. A (3 h,
+    3): how its model's rates answer their own past, Q (3, 3) (rad/s)2: covariance of its noise.
     """
     rng = np.random.default_rng(20)
     e = np.where(np.isfinite(samples.labels), samples.labels, 1.0)
     commands = _shifted(samples.commands, day.command_delay_s / samples.dt_s)
     trim = _running_mean(commands, round(_TRIM_MEAN_S / samples.dt_s))
     commands = trim + day.motion_scale * (commands - trim) / (day.common_gain * day.surface_gains)
-    drift = day.trim_drift_sd_commands * _coloured_noise(rng, commands.shape, 300.0 / samples.dt_s)
+    drift = day.trim_drift_sd_commands * _coloured_noise(rng, commands.shape, _DRIFT_TIME_S / samples.dt_s)
     commands = commands + day.neutral_shift_commands + (day.trim_shift_commands + drift) / e
     mean = _running_mean(samples.rates, round(_TRIM_MEAN_S / samples.dt_s))
     rates = mean + day.motion_scale * (samples.rates - mean)
@@ -151,7 +153,7 @@ def _coloured_noise(rng: np.random.Generator, shape: tuple[int, ...], n: float) 
 
 def _response_to_noise(rng: np.random.Generator, A: Floats, Q: Floats, n: int) -> Floats:
     """The rates x (n, 3), rad/s, of the model without commands, under white noise w (n, 3) of covariance Q,
-    rad/s:
+    (rad/s)2:
 
         x[k] = A' (x[k-1], ..., x[k-h]) + w[k]
     """
@@ -164,8 +166,8 @@ def _response_to_noise(rng: np.random.Generator, A: Floats, Q: Floats, n: int) -
 
 
 def run_other_days(folder: Path) -> Document:
-    """The document: an entry for each labelled data set, with a row for each day. Raises BadInput without
-    labels."""
+    """The document: an entry for each data set whose first flight has labels, with a row for each day. Raises
+    BadInput if there is none."""
     all_sets = benchmark.load_data_sets(folder)
     labelled = [data for data in all_sets if np.isfinite(data.flights[0].labels).any()]
     if not labelled:
@@ -194,8 +196,8 @@ def _test_data_set(data: benchmark.DataSet) -> Document:
 def _score_days(
     kind: str, days: Sequence[DayChanges], folds: Sequence[tuple[Model, FitPart]], whole: Model
 ) -> Iterator[Document]:
-    """Yield the scores of each day, with those of the rival detector under `beside`. whole: the model of all
-    flights, whose past and noise make the additional noise.
+    """Yield the scores of each day, with `classes` of the rival detector under `beside`. whole: the model of
+    all flights, whose past and noise make the additional noise.
     """
     A = np.array(whole.past)
     Q = np.array(whole.noise)

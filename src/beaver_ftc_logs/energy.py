@@ -1,9 +1,9 @@
 """Distinguish an engine failure from a surface fault: both change trim and motion.
 
 Without power, the energy height, altitude + V^2 / 2g, falls at the rate at which drag takes energy. Lift
-takes no energy, whatever the surfaces do. If the energy height has fallen as fast as with the engine idling
-since the evidence for an alarm began, no surface is named. The name is then `unknown`, and `engine` if the
-fall goes on.
+takes no energy, whatever the surfaces do. If the energy height has fallen as fast as without power since the
+evidence for an alarm began, and has not risen since, no surface is named. The name is then `unknown`, and
+`engine` if the fall goes on.
 """
 
 import numpy as np

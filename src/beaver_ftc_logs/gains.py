@@ -57,18 +57,18 @@ def widen_noise(parts: Parts, model: Model) -> Model:
         errors = _gain_errors(fold, _GAIN_WINDOW_S, loudness)
         inflations = windows.setdefault(fold.held_out.samples.noise_ma_coefficients, [])
         inflations.extend(min(error / max(n, 1), _MAX_INFLATION) for error, n in errors)
-    colours = []
+    noises = []
     for noise in model.colours:
         ma = tuple(noise.average)
-        wider = 1.0
+        inflation = 1.0
         if windows.get(ma):
-            wider = max(float(np.mean(windows[ma])), 1.0)
+            inflation = max(float(np.mean(windows[ma])), 1.0)
             if model.vehicle.other_laws:
                 # The noise of a gyro subtracts from the next sample what it added to one: its ma[1] is
                 # negative.
-                wider *= _GYRO_FACTOR if len(ma) > 1 and ma[1] < 0.0 else _GUST_FACTOR
-        colours.append(noise.model_copy(update={"wider": wider}))
-    return model.model_copy(update={"colours": colours})
+                inflation *= _GYRO_FACTOR if len(ma) > 1 and ma[1] < 0.0 else _GUST_FACTOR
+        noises.append(noise.model_copy(update={"wider": inflation}))
+    return model.model_copy(update={"colours": noises})
 
 
 def _loudness(fold: Fold, others: Parts) -> float:

@@ -103,7 +103,7 @@ def noise_scale(e2: Floats) -> float:
 
 def variance_inflation(Z: Floats) -> Floats:
     """Factor (m,) by which the other columns of Z (n, m) inflate the variance of each coefficient: 1 if a
-    column is independent of the others, inf if they determine it.
+    column is independent of the others, inf if they determine it or if it is constant.
 
         diag(C^-1) = sum over j of V[:, j]^2 / lam_j,    C = V diag(lam) V': correlation of the columns
     """

@@ -19,7 +19,7 @@ from beaver_ftc_logs.mixing_px4 import px4_mixing
 from beaver_ftc_logs.readers import SELECTIVE_READERS
 from beaver_ftc_logs.recording import Floats, Parameters
 
-# The flap command moves both in the same direction, the aileron command in opposite directions.
+# The outputs of both follow the aileron command with the same sign, and the flap command with opposite signs.
 _FLAPERONS = ("left_flaperon", "right_flaperon")
 
 

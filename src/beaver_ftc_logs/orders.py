@@ -120,10 +120,10 @@ def refit(parts: Parts, model: Model) -> Model:
     """A model of the same order and settings, fitted to other flights. Its noise models take over the
     variance inflation (`wider`) of the given model."""
     refitted = fitted_order(parts, model.vehicle, model.history, model.lags)[1]
-    colours = [
+    noises = [
         noise.model_copy(update={"wider": model.noise_of(noise.average).wider}) for noise in refitted.colours
     ]
-    return refitted.model_copy(update={"settings": model.settings, "colours": colours})
+    return refitted.model_copy(update={"settings": model.settings, "colours": noises})
 
 
 def fitted_order(parts: Parts, vehicle: Vehicle, h: int, L: int) -> tuple[least_squares.Regression, Model]:

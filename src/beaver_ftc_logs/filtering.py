@@ -47,7 +47,7 @@ from beaver_ftc_logs.samples import Samples
 _EVIDENCE_MEMORY_S = 600.0  # memory of the comparison of delays or noise models
 # Least probability of a hypothesis; also the rounding error of a sum of probabilities.
 _MIN_PROBABILITY = 1e-15
-_MIN_NOISE_SCALE = 0.3
+_MIN_NOISE_SCALE = 0.3  # limits of the running scale r
 _MAX_NOISE_SCALE = 6.0
 _SQUARE_CLIP = 3.0  # limit of d2 per axis in the running scale
 _SUM_SPANS_S = (0.0, 0.1)  # `recent_scale` sums the residual over each of these; 0: a single sample

@@ -86,7 +86,7 @@ def add_unseen_noise(model: Model, flights: Sequence[Samples]) -> Model:
     if not model.colours:
         return model
     known = [tuple(noise.average) for noise in model.colours]
-    # The covariance of a whitened residual is the density of the noise at 0 Hz.
+    # Q of `gyro_noise`: covariance of the quietest whitened residual.
     quietest = min((np.array(noise.noise) for noise in model.colours), key=np.linalg.det)
     powers = [noise.quick for noise in model.colours if noise.quick is not None]
     shared_fields: Document = {

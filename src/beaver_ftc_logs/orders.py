@@ -45,11 +45,11 @@ AR_ORDER = 20
 _USUAL_SHARE = 0.9
 RANK_TOLERANCE = 1e-9  # an eigenvalue that is smaller, over the largest, is rounding
 # Limits of the power of a group's effect, in variances of the noise in a sample. A smaller power is no
-# motion. A larger one counts as the cap: a fiftieth of the cap is 0.25, the square of half a standard
-# deviation.
+# motion. A larger one counts as the cap: the part of it that may remain, a fiftieth (`trust`), is 0.25, the
+# square of half a standard deviation.
 _MIN_EFFECT_POWER = 1e-6
 _EFFECT_POWER_CAP = 12.5
-# Largest standard error of a gain: with a third, `trust.known_gains` no longer takes the gain as known.
+# Largest standard error of a gain: from 0.25 on, `trust.known_gains` no longer takes the gain as known.
 GAIN_SD_CAP = 0.33
 
 

@@ -44,7 +44,7 @@ def constant_stretches(values: Floats) -> Runs:
 
 def trailing_sums(x: NDArray[Any], n: float) -> tuple[Floats, Ints]:
     """For each row the sum of x (k, ...) over the last n rows, itself included, and the number of these rows,
-    (k,): fewer than n at the begin, and at least one."""
+    (k,): n rounded, fewer at the begin, and at least one."""
     end = np.arange(1, len(x) + 1)
     begin = np.maximum(end - max(round(n), 1), 0)
     sums = np.concatenate([np.zeros((1, *x.shape[1:])), np.cumsum(x, axis=0)])

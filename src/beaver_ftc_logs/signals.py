@@ -22,7 +22,8 @@ _MAX_SPIKE_SHARE = 0.01  # if a larger share of the rows are spikes, the signal 
 
 
 def time_since_change_s(column: Column) -> Floats:
-    """How long a column's value has been the same at each row, (n,) s; 0 for fewer than MIN_STILL_ROWS."""
+    """How long a column's value has been the same at each row, (n,) s; 0 until it has stayed for
+    MIN_STILL_ROWS rows after its first."""
     since = last_true_row(_changed_rows(column.values))
     return np.where(np.arange(len(since)) - since >= MIN_STILL_ROWS, column.t_s - column.t_s[since], 0.0)
 

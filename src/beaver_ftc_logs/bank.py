@@ -9,7 +9,7 @@ that the filter does not adapt to a fault that exists from the start. The trim d
 rigging would change it, which is like a shift of each group's command, and it drifts. Gains return to those
 of the model in time, since the airspeed varies about that of the fitted flights. If the standard error of a
 group's gain is larger than a step between levels, the excess of its square is added to the variance of its
-own gain.
+own gain. The square of the share by which the fit may misread the group is always added.
 
 Letters as in `filtering`: n groups, B (n, L, 3) the responses and R (3, 3) the covariance of the noise, in
 rad/s and (rad/s)2 for one sample. Index g is a group.

@@ -166,7 +166,7 @@ class NoiseModel(Section):
     """The noise of some flights. Another gyro, other air or another law gives the residual another spectrum.
 
     average: 1, c1, ...: moving average of the noise, newest first
-    noise: covariance of the residual whitened by average and predicted by before, (3, 3), (rad/s)2
+    noise: covariance of the residual whitened by average, less the prediction by before, (3, 3), (rad/s)2
     before: AR coefficients: the previous residuals predict the next, latest first, (3 L, 3)
     wider: variance inflation: factor on noise, since gains scatter more in held-out parts, and under
     other laws, than the fit states

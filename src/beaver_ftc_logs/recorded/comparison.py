@@ -175,7 +175,7 @@ def _draw_failure_delays(axis: Any, data: Document) -> None:
         delays_s = [min(delay, _SHOWN_DELAY_S + 1.0) for delay in delays_s]
         heights = [titles.index(entry["method"]) + shift for entry in entries]
         label = failure.replace("_", " ").replace("+", " + ")
-        axis.plot(delays_s, heights, marker(i), color=SERIES[i], label=label)
+        axis.plot(delays_s, heights, marker(i), color=SERIES[i % len(SERIES)], label=label)
     axis.axvspan(_SHOWN_DELAY_S, _SHOWN_DELAY_S + 2.0, color=GRID)
     axis.set_xlim(-0.5, _SHOWN_DELAY_S + 2.0)
     axis.set_xlabel(f"delay, s (grey: not found within {_SHOWN_DELAY_S:g} s)", fontsize=9)

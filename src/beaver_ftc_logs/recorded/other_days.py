@@ -161,7 +161,7 @@ def _response_to_noise(rng: np.random.Generator, A: Floats, Q: Floats, n: int) -
     h = len(A) // 3
     x = np.zeros((n + h, 3))
     for k in range(n):
-        x[k + h] = x[k : k + h][::-1].ravel() @ A[: 3 * h] + w[k]
+        x[k + h] = x[k : k + h][::-1].ravel() @ A + w[k]
     return x[h:]
 
 
@@ -199,7 +199,7 @@ def _score_days(
     """Yield the scores of each day, with `classes` of the rival detector under `beside`. whole: the model of
     all flights, whose past and noise make the additional noise.
     """
-    A = np.array(whole.past)
+    A = np.array(whole.past)[: 3 * whole.history]  # the rows of the rates, without those of the signals
     Q = np.array(whole.noise)
     for day in days:
         scores: dict[str, list[Document]] = {OUR_DETECTOR: [], _RIVAL_DETECTOR: []}

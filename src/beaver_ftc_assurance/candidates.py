@@ -2,9 +2,10 @@
 certain to distinguish two of them.
 
 If the parameter of a fault is constant, the data since the alarm give an interval for it. At a command u, the
-deflection of its surface is then in an interval, too: stuck [c-, c+], floating 0, a loss [e- u, e+ u], a bias
-u + [b-, b+], rad. B (3,), rad/s2, is the bound on the innovation of a frame at the largest rates that the
-doublet may reach; G (3, n), rad/s2 per rad, the effectiveness of the surfaces; M a margin.
+deflection of its surface is then in an interval, too: stuck [c-, c+], floating 0 or the stop nearest to 0, a
+loss [e- u, e+ u], a bias u + [b-, b+], rad. B (3,), rad/s2, is the bound on the innovation of a frame at the
+largest rates that the doublet may reach; G (3, n), rad/s2 per rad, the effectiveness of the surfaces; M a
+margin.
 
 Two types on one surface s are distinguished by a frame in which, on some axis i, their deflections differ by
 more than 2 M B_i / |G_is|, twice the difference that the uncertainty can hide. They must differ from the
@@ -16,7 +17,6 @@ frame in which a differs from its command by more than 2 M |d|.B / |d.G_a|.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import combinations
 from math import degrees, inf
 
 import numpy as np
@@ -33,7 +33,7 @@ from beaver_ftc_assurance.doublet import LONGEST_S, Situation, doublet
 
 MARGIN = 1.1  # M: G and B are those of the last frame, and change while the doublet is flown
 GRID = 801  # number of deflections that are tried over the travel
-# Type with a constant parameter -> its relation.
+# Type with a constant parameter and a relation -> the relation.
 RELATIONS = {
     kind: row.deflection_relation
     for kind, row in enumerate(TYPES)
@@ -86,8 +86,10 @@ def situation_of(tape: Tape, scenario: Scenario, rate: float) -> Situation:
 
 
 def candidates(tape: Tape, history: History) -> Iterator[Candidate]:
-    """Every fault that is not excluded and has a constant parameter, with the interval of the parameter; none
-    if the diagnosis reports a fault of no known type, or if health explains all frames since the alarm."""
+    """Every fault of RELATIONS that is not excluded, with the interval of its parameter; left out if the
+    interval is empty. None at all if the diagnosis reports a fault of no known type, or if health explains
+    all frames since the alarm. The other frames alone give the interval: in a frame that health explains, the
+    fault may be absent."""
     last = tape.last.diagnosis
     frames = np.arange(round(last.detected_at_s / tape.last.dt_s), tape.end)  # from the alarm on
     shown = frames[history.is_unexplained(frames)]
@@ -123,7 +125,7 @@ def _interval(hypothesis: Hypothesis, history: History, frames: np.ndarray) -> t
     return max(hypothesis.theta_low, float(lower.max())), min(hypothesis.theta_high, float(upper.min()))
 
 
-def tell_apart(fault_a: Candidate, fault_b: Candidate, at: Situation, names: Sequence[str]) -> Document:
+def distinguish(fault_a: Candidate, fault_b: Candidate, at: Situation, names: Sequence[str]) -> Document:
     """A doublet that is certain to distinguish two candidates, or the reason why there is none.
 
     targets: surface -> deflection that it must reach. Of two surfaces, each must show its own fault.
@@ -208,21 +210,18 @@ def _deflections(at: Situation, s: int) -> np.ndarray:
 def _blind_to(b: int, at: Situation, a: int) -> Iterator[np.ndarray]:
     """Directions d (3,) with d.G_b = 0, in which surface a has an effect: for each two axes the direction
     perpendicular to G_b, and each axis on which b has no effect."""
-    for i, j in combinations(range(3), 2):
-        d = np.zeros(3)
-        d[i] = at.G[j, b]
-        d[j] = -at.G[i, b]
-        for direction in (d, *(np.eye(3)[k] for k in (i, j) if at.G[k, b] == 0.0)):
-            if abs(direction @ at.G[:, a]) > 1e-9 * np.abs(direction).max():
-                yield direction
+    G_b = at.G[:, b]
+    for d in (*np.cross(np.eye(3), G_b), *np.eye(3)[G_b == 0.0]):
+        if abs(d @ at.G[:, a]) > 1e-9 * np.abs(d).max():
+            yield d
 
 
 def _nearest(
     u: np.ndarray, difference: np.ndarray, s: int, at: Situation, room: float, words: str
 ) -> tuple[float | None, Document]:
     """The deflection of u (n,) nearest to the present one with difference > room, None if there is none; and
-    the numbers that decide it. difference (n,), rad: at each of u, with `words` for it. room, rad, infinite
-    if no direction shows the fault."""
+    the numbers that decide it. difference (n,), rad: at each of u; words: what the deflections must be by
+    more than room, for the message. room, rad: infinite if no direction shows the fault."""
     largest_deg = degrees(difference.max())
     is_enough = difference > room
     numbers: Document = {"at_least_deg": degrees(room) if room < inf else None}

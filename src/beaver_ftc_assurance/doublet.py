@@ -24,10 +24,10 @@ class Situation:
     rate            largest allowed size of a body rate, rad/s
     bound (3,)      on the innovation of a frame without a fault, while the rates stay below `rate`, rad/s2
     stops (2, n)    ends of travel, rad
-    approach (n,)   share of the way to its command that an actuator goes in a JSBSim frame
+    approach (n,)   share of the way to its command that an actuator goes in a JSBSim frame ("instant")
     step (n,)       largest movement of an actuator in a JSBSim frame, rad; infinite without a rate limit
     instants        JSBSim frames in a frame
-    in_blocks       whether types are tested by blocks of frames; `tell_apart` then asks for no doublet that
+    in_blocks       whether types are tested by blocks of frames; `distinguish` then asks for no doublet that
                     distinguishes types
     dt              length of a frame, s
     alpha           angle of attack, rad
@@ -50,13 +50,13 @@ class Situation:
 
     @property
     def frames_held(self) -> int:
-        """Number of frames for which the deflection must hold: 3 if a frame has several JSBSim frames, as
+        """Number of frames for which the deflection must hold: 3 if a frame has several instants, as
         `History.is_unexplained` then requires the frames before and after too."""
         return 1 if self.instants == 1 else 3
 
     def remaining_way(self, s: int) -> tuple[float, float]:
-        """Shares of the way to its command that surface s has still to go, if its rate limit does not act: at
-        the end of a frame, and on average over its instants j:
+        """Shares of the way to a new command that surface s has still to go, if its rate limit does not act:
+        at the end of a frame, and on average over its instants j:
 
             (1 - approach)^instants,    mean over j = 0 .. instants - 1 of (1 - approach)^j
 

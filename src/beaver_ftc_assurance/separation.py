@@ -22,9 +22,9 @@ from beaver_ftc_assurance.candidates import (
     RELATIONS,
     Candidate,
     candidates,
+    distinguish,
     faults_left,
     situation_of,
-    tell_apart,
 )
 from beaver_ftc_assurance.certificates import proved
 from beaver_ftc_assurance.certificates.certificate import (
@@ -44,10 +44,12 @@ HELD_DEG = 1e-9  # a doublet of a smaller amplitude moves no surface
 
 
 def separate(scenario: Scenario, rate_deg_s: float = LARGEST_RATE_DEG_S) -> Document:
-    """Fly a scenario, and propose a doublet for each two of the candidates that remain at its end.
+    """Fly a scenario, and propose a doublet for each two of the candidates that remain at its end. With
+    `fdi.probing`, fly each doublet. A pair without a doublet, or whose doublet is not flown, passes.
 
-    rate_deg_s: largest allowed body rate, deg/s. Raises BadInput if no alarm was raised, if fewer than two
-    candidates remain, or if the scenario declares pairs of faults or errors of the servos.
+    rate_deg_s: largest allowed body rate, deg/s. Raises BadInput if the scheme is not ours, if no alarm was
+    raised or the flight ends with it, if fewer than two candidates remain, or if the scenario declares pairs
+    of faults or errors of the servos.
     """
     check_scheme(scenario)
     if scenario.fdi.pairs:
@@ -60,7 +62,7 @@ def separate(scenario: Scenario, rate_deg_s: float = LARGEST_RATE_DEG_S) -> Docu
     landing = fly(scenario, log, watch=recorder.watch)
     if landing.detection_time_s is None:
         raise BadInput(f"{scenario.name}: no alarm was raised, allowed with separate: a flight with one")
-    tape, history = _seen(scenario, log, recorder)
+    tape, history = _tape_and_history(scenario, log, recorder)
     situation = situation_of(tape, scenario, radians(rate_deg_s))
     left = [*candidates(tape, history)]
     names = scenario.airframe.surfaces
@@ -68,7 +70,7 @@ def separate(scenario: Scenario, rate_deg_s: float = LARGEST_RATE_DEG_S) -> Docu
         raise BadInput(f"{scenario.name}: one candidate or none is left, allowed with separate: two at least")
     pairs = []
     for both in combinations(left, 2):
-        pair = {"candidates": [_words(candidate, names) for candidate in both]} | tell_apart(
+        pair = {"candidates": [_words(candidate, names) for candidate in both]} | distinguish(
             *both, situation, names
         )
         if scenario.fdi.probing is not None and pair["separates"]:
@@ -92,11 +94,11 @@ def _frames(scenario: Scenario) -> int:
 
 def _flown(scenario: Scenario, pair: Document, candidates: Sequence[Candidate]) -> Document:
     """The candidates of a pair that remain after the flight with the doublet, and how often the aircraft left
-    its envelope during the doublet."""
+    its envelope in the part of the doublet that is flown (`_with_doublet`)."""
     with _longer(scenario, pair) as flight:
         exits_before = 0
         for k in _with_doublet(flight, scenario, pair):
-            if k == _frames(scenario) - 1:
+            if k == _frames(scenario) - 1:  # the last frame before the doublet
                 exits_before = flight.readout.envelope_exits
         remaining = {*faults_left(flight.readout.diagnosis)}
         both = zip(candidates, pair["candidates"], strict=True)
@@ -106,7 +108,8 @@ def _flown(scenario: Scenario, pair: Document, candidates: Sequence[Candidate]) 
 
 @contextmanager
 def _longer(scenario: Scenario, pair: Document) -> Iterator[Stepping]:
-    """The flight of a scenario, longer by the duration of the doublet and ten frames."""
+    """The flight of a scenario, with time for the whole doublet and ten frames more. `_with_doublet` ends it
+    before."""
     spare_s = pair["duration_s"] + 10.0 / scenario.rate_hz
     flight = Stepping(scenario.model_copy(update={"duration_s": scenario.duration_s + spare_s}))
     try:
@@ -116,12 +119,13 @@ def _longer(scenario: Scenario, pair: Document) -> Iterator[Stepping]:
 
 
 def _with_doublet(flight: Stepping, scenario: Scenario, pair: Document) -> Iterator[int]:
-    """Fly to the end of the scenario, and then the doublet. Yields the number of each frame after it is
-    flown. held_rad: commands at the end of the scenario, of the surfaces that the doublet does not move (any
-    more)."""
+    """Fly to the end of the scenario, and then the doublet for its `time_s`, after which the pair must be
+    distinguished: the way back of a longer doublet is not flown. Yields the number of each frame once the
+    record holds it. held_rad: where the surfaces are at the end of the scenario, the command of those that
+    the doublet does not move (any more)."""
     frames = _frames(scenario)
     names = list(scenario.airframe.surfaces)
-    yield 0
+    yield 0  # `records`, or else the first step, flies it
     for k in range(1, frames):
         flight.step()
         yield k
@@ -154,7 +158,7 @@ def write(document: Document, scenario: Scenario, out: Path) -> Path:
     return out / name
 
 
-def _seen(scenario: Scenario, log: MemoryLog, recorder: Recorder) -> tuple[Tape, History]:
+def _tape_and_history(scenario: Scenario, log: MemoryLog, recorder: Recorder) -> tuple[Tape, History]:
     """Tape and history of a flight from its alarm to its end. Raises BadInput if it ends with the alarm."""
     rows = logged_columns(log)
     detected = rows["detected"]
@@ -166,7 +170,7 @@ def _seen(scenario: Scenario, log: MemoryLog, recorder: Recorder) -> tuple[Tape,
 
 
 def open_courses(tape: Tape, names: Sequence[str]) -> list[str]:
-    """Words for the remaining faults without a constant parameter: only a comparison of many frames
+    """Words for the remaining faults that are not in RELATIONS: only a comparison of many frames
     distinguishes them."""
     left = faults_left(tape.last.diagnosis)
     return sorted(f"{names[s]} {NAMES[kind]}" for s, kind in left if kind not in RELATIONS)
@@ -185,7 +189,7 @@ def doublets(scenario: Scenario, after_s: float, loss: float) -> dict[tuple[str,
     doublets_of_pairs = {}
     for pair in combinations(scenario.airframe.class_of_losses, 2):
         first, second = (Candidate(names.index(name), LOSS, -loss, -loss) for name in pair)
-        result = tell_apart(first, second, at, names)
+        result = distinguish(first, second, at, names)
         numbers = result.get("amplitude_deg"), result.get("time_s"), result.get("because", "")
         doublets_of_pairs[pair] = doublets_of_pairs[pair[::-1]] = dict(
             zip(DOUBLET_COLUMNS, numbers, strict=True)

@@ -47,7 +47,8 @@ class Certified:
             first += n
 
     def write(self, folder: Path) -> None:
-        """Write certificate, log and scenario into a folder."""
+        """Write certificate, log and scenario into a folder. A log that is there already stays if it lacks no
+        column."""
         if self.columns or not (folder / LOG_NAME).exists():
             extended = folder / f".{LOG_NAME}"
             with ParquetLog(extended) as log:
@@ -66,6 +67,6 @@ class PartialColumn:
     first: int
     values: np.ndarray
 
-    def rows(self, first: int, n: int) -> np.ndarray:
-        """The rows from `first` on, (n,)."""
-        return self.values[np.clip(np.arange(first, first + n) - self.first, 0, len(self.values) - 1)]
+    def rows(self, start: int, n: int) -> np.ndarray:
+        """The rows from `start` on, (n,)."""
+        return self.values[np.clip(np.arange(start, start + n) - self.first, 0, len(self.values) - 1)]

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 import beaver_ftc as bf
 from beaver_ftc.cli.main import main
-from beaver_ftc_assurance.candidates import Candidate, tell_apart
+from beaver_ftc_assurance.candidates import Candidate, distinguish
 from beaver_ftc_assurance.doublet import Situation, doublet
 from beaver_ftc_assurance.separation import as_text, separate
 from fault_kinds import BIAS, CONSTANT_LOSS, FLOAT, STUCK
@@ -62,34 +62,34 @@ def test_what_is_proposed_tells_apart_when_it_is_flown(substeps):
 def test_it_takes_what_the_two_intervals_ask_for():
     """Jammed at 2 deg, or a loss of all: apart by 2 deg wherever it is commanded."""
     jam, floating = Candidate(1, STUCK, 0.03, 0.031), Candidate(1, FLOAT, 0.0, 0.0)
-    assert tell_apart(jam, floating, PLAIN, NAMES)["separates"]
+    assert distinguish(jam, floating, PLAIN, NAMES)["separates"]
     room = 2 * 1.1 * 0.02 / 8.0
     near = replace(jam, low=0.9 * room, high=0.95 * room)
-    pair = tell_apart(near, floating, PLAIN, NAMES)
+    pair = distinguish(near, floating, PLAIN, NAMES)
     assert not pair["separates"]
     assert pair["needs"]["elevator"]["at_least_deg"] == pytest.approx(np.degrees(room))
     biased = Candidate(1, BIAS, 1.2 * room, 1.25 * room)
-    pair = tell_apart(near, biased, PLAIN, NAMES)
+    pair = distinguish(near, biased, PLAIN, NAMES)
     assert pair["separates"]  # one of them follows the command: from 1.25 - 1.35 to less than 0.9 - 1
     assert pair["amplitude_deg"] == pytest.approx(np.degrees(1.35 * room), abs=0.06)
-    assert not tell_apart(near, replace(biased, low=0.9 * room), PLAIN, NAMES)["separates"]  # as health is
+    assert not distinguish(near, replace(biased, low=0.9 * room), PLAIN, NAMES)["separates"]  # as health is
 
 
 def test_surfaces_that_act_along_one_direction_cannot_be_told_apart_by_a_frame():
-    pair = tell_apart(Candidate(1, STUCK, 0.1, 0.11), Candidate(3, STUCK, 0.2, 0.22), PLAIN, NAMES)
+    pair = distinguish(Candidate(1, STUCK, 0.1, 0.11), Candidate(3, STUCK, 0.2, 0.22), PLAIN, NAMES)
     assert not pair["separates"]
     assert "another direction" in pair["because"]
 
 
 def test_a_surface_without_effect_shows_no_type():
     none = replace(PLAIN, G=np.zeros((3, 4)))
-    pair = tell_apart(Candidate(1, STUCK, 0.1, 0.11), Candidate(1, FLOAT, 0.0, 0.0), none, NAMES)
+    pair = distinguish(Candidate(1, STUCK, 0.1, 0.11), Candidate(1, FLOAT, 0.0, 0.0), none, NAMES)
     assert "another direction" in pair["because"]
     assert pair["needs"]["elevator"]["at_least_deg"] is None
 
 
 def test_surfaces_that_act_along_two_directions_can():
-    pair = tell_apart(
+    pair = distinguish(
         Candidate(0, CONSTANT_LOSS, -0.6, -0.5), Candidate(2, CONSTANT_LOSS, -0.9, -0.8), PLAIN, NAMES
     )
     assert pair["separates"]
@@ -126,14 +126,14 @@ def test_a_doublet_is_there_and_back_within_every_limit(target, instants, approa
 
 def test_where_frames_are_examined_in_blocks_no_frame_tells_types_apart():
     both = Candidate(0, STUCK, 0.1, 0.11), Candidate(0, BIAS, 0.1, 0.11)
-    assert tell_apart(*both, PLAIN, NAMES)["separates"]
-    assert "blocks of frames" in tell_apart(*both, replace(PLAIN, in_blocks=True), NAMES)["because"]
+    assert distinguish(*both, PLAIN, NAMES)["separates"]
+    assert "blocks of frames" in distinguish(*both, replace(PLAIN, in_blocks=True), NAMES)["because"]
 
 
 def test_where_a_surface_already_tells_it_is_held():
     """A jam at neutral and a bias differ by 0.15 rad where the surface is: between two deflections tried."""
     there = replace(PLAIN, u=np.array([0.0, -0.2001, 0.0, 0.0]))
-    found = tell_apart(Candidate(1, STUCK, 0.0, 0.0), Candidate(1, BIAS, 0.05, 0.06), there, NAMES)
+    found = distinguish(Candidate(1, STUCK, 0.0, 0.0), Candidate(1, BIAS, 0.05, 0.06), there, NAMES)
     assert found["amplitude_deg"] == pytest.approx(0.0, abs=1e-9)
     assert np.array(found["commands_rad"]["elevator"]) == pytest.approx(-0.2001, abs=1e-12)
     kinds = [{"surface": "elevator", "type": kind} for kind in ("stuck", "bias")]
@@ -150,7 +150,7 @@ def test_a_slow_actuator_has_all_of_the_half_second():
 
 
 def test_a_limit_on_the_rates_can_leave_none():
-    pair = tell_apart(
+    pair = distinguish(
         Candidate(0, STUCK, 0.1, 0.11), Candidate(0, BIAS, 0.1, 0.11), replace(PLAIN, rate=1e-4), NAMES
     )
     assert not pair["separates"]

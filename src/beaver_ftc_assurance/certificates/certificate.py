@@ -75,7 +75,7 @@ def certificate(
     recorder: has the quantities that the log lacks; without it, the scenario is flown again. text: content of
     the file scenario.yaml beside the log, if it differs from `to_yaml(scenario)`.
 
-    Raises BadInput if another scheme than ours diagnosed.
+    Raises BadInput if the scheme of the scenario is not ours.
     """
     check_scheme(scenario)
     rows = logged_columns(log)
@@ -174,17 +174,18 @@ class _Flight:
     history: History
 
     def statements(self, events: dict[str, int]) -> Iterator[Document]:
-        """A statement for each event. If an event cannot be certified, its statement has no sides, and the
-        reason in `because`."""
+        """A statement for each event and, with the fault class `all`, for each excluded type; for the alarm
+        alone, if another scheme than ours was in charge at the alarm. If an event cannot be certified, its
+        statement has no sides, and the reason in `because`."""
         alarm = events["detected"]
         diagnosis = self.tape.alarm.diagnosis
         tape = self.tape
         alarm_fields: Document = {"what": None, "column": "detected", "frame": alarm}
         ours = scheme_number("adaptive-estimators")
-        ours_raised = diagnosis.estimators and diagnosis.enabled and diagnosis.scheme_number == ours
-        of_alarm = alarm_fields | self._alarm(alarm, bool(ours_raised))
+        is_ours = diagnosis.estimators and diagnosis.enabled and diagnosis.scheme_number == ours
+        of_alarm = alarm_fields | self._alarm(alarm, bool(is_ours))
         yield of_alarm
-        if not ours_raised:
+        if not is_ours:
             return
         for e, name in enumerate(tape.names):
             column = f"fie_{name}_excluded"
@@ -199,12 +200,12 @@ class _Flight:
             yield from self._types(max(alarm, 1))  # the first row has no innovation
 
     def _alarm(self, k: int, is_ours: bool) -> Document:
-        """Evidence of the alarm at row k. is_ours: whether our scheme raised it. The first source that has
-        evidence:
+        """Evidence of the alarm at row k. is_ours: whether our scheme was in charge. The first source that
+        has evidence:
 
-            a detection filter beyond its bound, if our scheme raised the alarm
-            the sensor monitor, if it raised the alarm
-            the statistical detector, if our scheme raised the alarm and the scenario declares this detector
+            a detection filter beyond its bound, if is_ours
+            the sensor monitor, if it raised the alarm; it may have a reason instead
+            the statistical detector, if is_ours and the scenario declares this detector
 
         If none has, the reason.
         """
@@ -222,8 +223,8 @@ class _Flight:
         return by_chance or {"because": chance.ALARM_NOT_STATED}
 
     def _filter_alarm(self, k: int) -> Document | None:
-        """Evidence that a detection filter exceeded its bound at frame k; None if none did, or if the
-        diagnosis had not begun before."""
+        """Evidence that the innovation of frame k, or a detection filter at frame k, exceeds its bound; None
+        if none does, or if the diagnosis had not begun before frame k."""
         tape = self.tape
         all_axes = (0, 1, 2)
         if k <= tape.since:
@@ -239,13 +240,13 @@ class _Flight:
 
     def _exclusion(self, e: int, alarm: int, k: int) -> Document | None:
         """Evidence against the fault of estimator e at frame k, the first of these inequalities that is
-        violated:
+        violated; None if none is:
 
             theta may change in each frame   of frame k, the detection filters, the isolation filter
             theta is constant                of two frames, for a loss and `fault_profile: abrupt`;
-                                             of the isolation filter, for `thresholds: published`
+                                             otherwise of the isolation filter, for `thresholds: published`
 
-        The isolation filter, and the two frames, begin with the alarm.
+        The isolation filter starts at the alarm, and the two frames are not before it.
         """
         tape = self.tape
         config = self.scenario.fdi
@@ -277,8 +278,8 @@ class _Flight:
     ) -> Iterator[list[Term]]:
         """Inequalities of the detection filters, each with a bound on the fault's effect in the filter before
         the first kept frame (reach). across (3,): direction in which the fault has no effect, zeros if there
-        is none. The last axis of `reach_low` and `reach_high` has the three axes, and this direction as the
-        fourth."""
+        is none; it is used if the fault is tested on all axes. The last axis of `reach_low` and `reach_high`
+        has the three axes, and this direction as the fourth."""
         tape = self.tape
         directions = [([*axis_directions((i,))], i) for i in axes]
         directions += [([across, -across], 3)] if across.any() and len(axes) == 3 else []
@@ -288,9 +289,9 @@ class _Flight:
                     yield [Term(d, pole, tape.since, k, effect_before=float(reach[e, m, i]))]
 
     def _types(self, alarm: int) -> Iterator[Document]:
-        """A statement for each excluded type, surface by surface. Its column is one of `evidence_columns`. If
-        types are tested by blocks of frames, tape, history and alarm are those by blocks; without a complete
-        block, no type is certified."""
+        """A statement for each type that is excluded at the end of the tape, surface by surface. Its column
+        is one of `evidence_columns`. If types are tested by blocks of frames, tape, history and alarm are
+        those by blocks; without a complete block, no type is certified."""
         tape = self.tape
         history = self.history
         if tape.alarm.diagnosis.types_config.frames_per_block > 1:
@@ -319,8 +320,8 @@ class _Flight:
         return self._sum_of_block(kinds.hypothesis_of_type(self.tape, s, kind), history, k)
 
     def _sum_of_block(self, hypothesis: Hypothesis, blocks: History, k: int) -> Document | None:
-        """Evidence of block k, or of the block before, as a sum over its frames, in which theta may differ. A
-        block is left out if it begins before the first frame whose effects of a fault are kept."""
+        """Evidence of the block before block k, or of block k, as a sum over its frames, in which theta may
+        differ. The effects of a fault must be kept from the row before the block on."""
         L = blocks.length
         starts = [blocks.begin + block * L - 1 for block in (k - 1, k)]
         kept = (start for start in starts if start >= hypothesis.first_frame)
@@ -329,8 +330,8 @@ class _Flight:
 
     def declared_fields(self, statements: list[Document]) -> Document:
         """The fields of the certificate that all statements share: declared errors, times, Earth's rate. The
-        constant part of a gyro's error is stated only on axes that a statement uses, if all statements hold
-        with it.
+        constant part of a gyro's error is stated only on axes that a statement uses, if with it health
+        explains no frame that must be unexplained; otherwise on all axes.
 
         spans: each term or bound of a statement, with the statement. on_axes (3,): whether a span uses the
         axis.

@@ -35,7 +35,7 @@ def alarm_evidence(
     tape: Tape, history: History, surfaces: Sequence[str], rows: Mapping[str, np.ndarray], k: int
 ) -> Document | None:
     """The evidence of a statistical alarm at row k; None if its onset is too old, or if the ratio from the
-    frames differs from the score of the detector.
+    frames does not exceed 1, or differs from the score of the detector.
 
     rows: the log, whose column has the largest share of the alarm level over all blocks of a hypothesis, so
     at least the share of this evidence. first: the last row at which the slot of the largest score restarted.
@@ -107,7 +107,7 @@ def _likelihood_ratio(
 
     before, now: quantities at the end of the row before each row, and of the row itself. The detector
     prepares noise, decay, bound and rate of change of the drift at the end of the row before; it fills inputs
-    and responses in the row itself. moved: positions in the block of the axes that the fault moves. states:
+    and responses in the row itself. moved: positions in the block of the axes (`_affected_axes`). states:
     positions of their rate errors, then of their drifts, in the states of the block. known: numbers of the
     declared constants that act on these axes.
     """
@@ -159,8 +159,8 @@ def _a_frame_later(drift: np.ndarray) -> np.ndarray:
 
 
 def _supporting_parts(block: StatisticalBlock, h: int, slot: int) -> list[str]:
-    """The recorded quantities of the predictable parts of the innovation whose correlation supports the
-    fault."""
+    """The recorded quantities of the predictable parts of the innovation whose correlation has the sign that
+    supports the fault; none if either sign does."""
     tests = block.hypothesis_tests_by_onset
     predictable = {
         "p": tests.correlation_predictable_in_calm_air,

@@ -3,8 +3,9 @@
     python check_certificate.py FOLDER                        the folder of a run
     python check_certificate.py CERTIFICATE LOG [SCENARIO]    files that lie elsewhere
 
-Exit status 0 if every statement holds, 1 if not. `beaver-ftc check RUN` runs this same file. It imports
-NumPy, the reader of the log's file, the reader of the scenario's file (PyYAML) and the standard library.
+Exit status 0 if every statement holds, 1 if one does not or a file cannot be read. `beaver-ftc check RUN`
+runs this same file. It imports NumPy, the reader of the log's file, the reader of the scenario's file
+(PyYAML) and the standard library.
 
 The flight's log and its scenario are taken as true. Numbers of the certificate that are in neither of them
 are tested as far as Table 2 of docs/explanation/certificates.md describes. A statement is accepted if the
@@ -355,7 +356,8 @@ def check_declared(document, declared):
     """Refuse bounds that are not those of the scenario.
 
     The bias B of a gyro may be left out: the bound on its noise is then larger, which proves less. c, b and g
-    only explain the bound in the log. c must be zero on an axis for which the scenario declares no share.
+    only explain the bound in the log, and are tested only if omega_E is stated. b is at least the constant
+    bound of the scenario. c must be zero on an axis for which the scenario declares no share.
     """
     check_form(document.get("declared"), *FORMS["declared"], "declared")
     for axis, (offset, bias, slope) in declared.gyro_errors.items():
@@ -609,7 +611,8 @@ def term_pairs(statement, frames):
 
 
 def check_theta(statement, effect, frames):
-    """Refuse ends of theta's range that are not the log's, and a constant theta that nothing justifies."""
+    """Refuse ends of theta's range that are not the log's, a constant theta that nothing justifies, and an
+    alarm by blocks."""
     for end, known in (("least", effect.theta_low), ("most", effect.theta_high)):
         require(statement.get(end, known) == known, f"{end} is not the end of theta's range in the log")
     fdi = frames.declared.scenario["fdi"]
@@ -629,8 +632,9 @@ def check_theta(statement, effect, frames):
 
 
 def check_term_frames(term, statement, frames):
-    """Refuse frames `since`, `first` and k of a term that are out of order, later than the event, or before
-    the diagnosis started. A term without a pole has one frame, since = k - 1. Returns `since`."""
+    """Refuse frames `since`, `first` and k of a term that are out of order, later than the event, or, except
+    in blocks, before the diagnosis started. A theta that is constant while it shows needs a frame k that
+    health does not explain. A term without a pole has one frame, since = k - 1. Returns `since`."""
     k = term["frame"]
     first = term["first"]
     since = term.get("since", k - 1)
@@ -656,7 +660,7 @@ def evaluate_term(term, statement, frames, effect):
 
     Without a pole a is 0, and the sums have the one frame k. phi[j], rad/s2: largest effect of the fault,
     without theta if theta is constant. The field `fault`, rad/s, is the effect that the filter has summed up
-    to frame first - 1; it must be at least the sum of the logged effects there.
+    to frame first - 1; it must be at least the sum of those effects there that the log has.
     """
     k = term["frame"]
     first = term["first"]
@@ -868,7 +872,10 @@ def position_bound(bound, place, k, frames, effect):
 def likelihood_pairs(statement, frames):
     """The evidence and its limit; and the log's share of the level and the ratio of the two.
 
-    N = sum w.g and D = sum w.g_s, see `whitened_sums`; limit: max(z sqrt D, room + z/2 sqrt D).
+    evidence = |N| - sum_j tolerance_j |N_j|        sense "less": -N - max(0, -N_f) in place of |N|
+    limit = max(z sqrt D, room + z/2 sqrt D)
+
+    N, D, N_j, N_f: sums of w.g for innovation, signature, constant j and `foreseen`, see `whitened_sums`.
     """
     check_level(statement, frames)
     (N, D, *of_constants, foreseen), room = whitened_sums(statement, frames)
@@ -904,8 +911,8 @@ def check_level(statement, frames):
 
 
 def whitened_sums(statement, frames):
-    """Sums over the frames of w.g for each column g, and the room, i.e. the largest contribution of a bounded
-    drift.
+    """Sums over the frames of w.g for each column g, then of w.foreseen; and the room, i.e. the largest
+    contribution of a bounded drift.
 
     A Kalman filter with the stated variances whitens the columns of Y: innovation, signature g_s, constants.
     It has two states for each axis, a value and its drift. w = S^-1 g_s, S = P_values + R: covariance of the
@@ -962,7 +969,8 @@ def array_with_zeros(values):
 
 
 def check_exclusion_by_alarm(statement, document, frames):
-    """Refuse unless an earlier statistical alarm came on axes that this fault does not move."""
+    """Refuse unless the first statement is a statistical alarm, no later than this event, on axes that this
+    fault does not move."""
     alarm = document["statements"][0]
     require(alarm.get("what", "") is None and "likelihood" in alarm, "there is no statistical alarm before")
     require(alarm["frame"] <= statement["frame"] and statement["what"] is not None, "the alarm came later")

@@ -62,9 +62,9 @@ class SurfaceBounds:
 
     def runs_beyond(self, reference: np.ndarray) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
         """For each axis: the axis; distance (n,) by which each frame shows the surface beyond `reference`
-        (n,), rad; and starts (n,). A frame is *beyond* if this distance is positive and health does not
-        explain the frame. starts[k]: first frame of the unbroken run of frames beyond that ends with frame k;
-        k + 1 if frame k is not beyond."""
+        (n,), rad; and starts (n,). A frame is *beyond* if this distance is more than rounding and health does
+        not explain the frame. starts[k]: first frame of the unbroken run of frames beyond that ends with
+        frame k; k + 1 if frame k is not beyond."""
         numbers = np.arange(len(reference))
         for axis, lower in enumerate(self.lower.T):
             beyond = self.is_unexplained & (lower > reference + MIN_POSITION_DIFFERENCE_RAD)
@@ -89,8 +89,8 @@ class SurfaceBounds:
 
     def _bound_fields(self, held: Hypothesis, frames: range, axis: int, side: int) -> Document:
         """The entry of frames that bound the position by an axis, from below (side 1) or above (-1):
-        direction d along which the effect G (p - u) grows with the bound, first and last frame, and h, Z, r
-        of the hypothesis along d."""
+        direction d along which Z has the sign of `side`, first and last frame, and h, Z, r of the hypothesis
+        along d. Z is for positions that are multiplied by the sign of these bounds."""
         first = self.first_frame + frames[0]
         last = self.first_frame + frames[-1]
         d = np.zeros(3)
@@ -183,8 +183,8 @@ def _exclude_runaway(bounds: SurfaceBounds) -> Document | None:
 
 
 def _exclude_oscillation(bounds: SurfaceBounds) -> Document | None:
-    """Exclude an oscillation about the command: the surface is on one side of the command for more frames
-    than half of the slowest period, pi / (slowest_rad_s dt)."""
+    """Exclude an oscillation about the command: the surface is on one side of the command from frame i to
+    frame k, for longer than half of the slowest period: k - i > pi / (slowest_rad_s dt)."""
     for axis, beyond, starts in bounds.runs_beyond(bounds.command):
         for k in np.flatnonzero(np.arange(len(starts)) - starts > bounds.config.half_blocks)[:1].tolist():
             run = range(int(starts[k]), k + 1)
@@ -270,8 +270,8 @@ def _surface_bounds(
     the command is u = -offset / slope.
 
     reach (n, 2): least and greatest position of a healthy surface in each frame. orders (n, 3): largest
-    orders to the surface; in a frame of one instant only the last column is in effect, otherwise the last
-    two.
+    orders to the surface, from the row after each frame; in a frame of one instant only the last column is in
+    effect, otherwise the last two.
     """
     frames = np.arange(alarm_frame, tape.end - 1)
     has_instants = not history.has_single_instants

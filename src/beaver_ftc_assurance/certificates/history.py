@@ -31,10 +31,9 @@ class DeclaredErrors:
 
     inertia_coupling: largest error of the model's coefficient of a product of two rates, 1/rad.
     constant_rad_s2: constant part of the bound. earth_rad_s: rate of the Earth, which the model leaves out.
-    earth_gain:
-    bound on the coefficients of products with the Earth's rate, 1/rad, at least 1 (`declared_errors_of`). The
-    error of a gyro is at most gyro_offset_rad_s + gyro_slope |rate|; gyro_constant_rad_s is the part of it
-    that does not change.
+    earth_gain: bound on the coefficients of products with the Earth's rate, 1/rad, at least 1
+    (`declared_errors_of`). The error of a gyro is at most gyro_offset_rad_s + gyro_slope |rate|;
+    gyro_constant_rad_s is the part of it that does not change.
     """
 
     inertia_coupling: np.ndarray
@@ -159,7 +158,7 @@ class History:
     def is_unexplained(self, frames: np.ndarray) -> np.ndarray:
         """Whether health does not explain each of the given consecutive frames >= 1, (frames,): |nu| exceeds
         its bound on an axis. If a frame has several instants, this must hold for the frames before and after,
-        too, because a fault may begin within a frame."""
+        too, because a fault may begin within a frame; it does not hold for a frame after the last one."""
         rows = slice(int(frames[0]) - 1, min(int(frames[-1]) + 2, len(self.rates_rad_s)))
         exceeds = (np.abs(self.innovation_rad_s2[rows]) > self.innovation_bound(rows)).any(axis=1)
         padded = np.r_[exceeds, np.zeros(len(frames) + 2 - len(exceeds), bool)]
@@ -175,8 +174,9 @@ class History:
 
     def declared_fields(self, rows: np.ndarray | None) -> Document:
         """The field `declared` of a certificate, by letter and axis (docs/explanation/certificates.md, "The
-        fields"): the errors that are not zero and add to the bounds of these rows. rows: those of all terms
-        and bounds, None if there are none."""
+        fields"): the errors that are not zero. c is left out on an axis where it adds nothing to the bounds
+        of these rows; c, b and g without rows. rows: those of all terms and bounds, None if there are
+        none."""
         errors = self.declared
         gyro = {"o": errors.gyro_offset_rad_s, "B": errors.gyro_constant_rad_s, "m": errors.gyro_slope}
         if rows is None:

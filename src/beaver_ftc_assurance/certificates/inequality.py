@@ -22,7 +22,8 @@ from beaver_ftc.results import Document
 from beaver_ftc_assurance.certificates.check_certificate import MIN_EFFECT_RAD_S2
 from beaver_ftc_assurance.certificates.history import ROUNDING_SHARE, History
 
-N_WRITTEN_FRAMES = 16  # last frames of a filter that are written out; earlier ones are in the filter's state
+# Last frames of a filter that are written out if theta may change; earlier ones are in the filter's state.
+N_WRITTEN_FRAMES = 16
 MIN_RELATIVE_MARGIN = 1e-9  # least margin of the left side over the larger side: rounding of sums is smaller
 MIN_SLOPE = 1e-12  # a smaller factor of theta in a sum is rounding, as where theta drops out of two terms
 # Values of the field theta of a statement, as in `Hypothesis`.
@@ -281,9 +282,9 @@ def theta_bounds_by_frame(
 
 
 def constant_theta_tests(hypothesis: Hypothesis, history: History, frames: np.ndarray) -> list[Term]:
-    """The terms of two frames that no single theta explains: the one with the largest lower bound and the one
-    with the least upper bound. A term is left out if the end of the range bounds theta as much; empty without
-    frames.
+    """The terms of the two frames that bound a constant theta most: the one with the largest lower bound and
+    the one with the least upper bound. The data violate their sum if these bounds contradict one another. A
+    term is left out if the end of the range bounds theta as much; empty without frames.
     """
     if not len(frames):
         return []

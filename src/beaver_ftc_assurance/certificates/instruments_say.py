@@ -21,8 +21,8 @@ ROUNDING_SHARE = 1e-13  # a smaller share of a limit is rounding
 def alarm_evidence(monitor: SensorMonitor, rows: Mapping[str, np.ndarray], k: int) -> Document:
     """The evidence of an alarm in row k, the first of
 
-        the test with its comparisons        if a test failed, and the row shows it
-        the sensor without a reading         if the log's column `watch_missing` has it in row k
+        the test with its comparisons        if a test failed, and its comparisons exceed their bounds
+        the sensor without a reading         if no test failed, and `watch_missing` of the log has it in row k
         the reason why there is no evidence
 
     monitor: at the alarm. The field `looks` lists the comparisons whose sum is the residual of the test:

@@ -3,8 +3,7 @@
 
 A single frame excludes such a type if no theta explains the frame. If theta is constant while the fault
 shows, two frames that no single theta explains exclude it, too. A type whose row names a course is excluded
-by a comparison of many frames (courses.py). If an actuator may bring a surface back over several frames, an
-exclusion is not certified.
+by a comparison of many frames (courses.py). `reason_not_certified` says which exclusions have no certificate.
 """
 
 from collections.abc import Iterator
@@ -35,7 +34,8 @@ STUCK = type_index_of("stuck")
 
 
 def excluded_types(tape: Tape) -> Iterator[tuple[int, int, int]]:
-    """(surface, type, frame) of each excluded type, on surfaces whose position estimator is not excluded."""
+    """(surface, type, first frame of the tape with the flag) of each type that is excluded at the end of the
+    tape, on surfaces whose position estimator is not excluded there."""
     layout = tape.alarm.diagnosis.layout
     for s, kinds in enumerate(tape.types[-1]):
         if tape.excluded[-1][layout.position_estimator_index_by_surface[s]]:
@@ -45,7 +45,13 @@ def excluded_types(tape: Tape) -> Iterator[tuple[int, int, int]]:
 
 
 def reason_not_certified(tape: Tape, kind: int) -> str | None:
-    """Why an exclusion of this type cannot be certified; None if it can."""
+    """Why an exclusion of this type cannot be certified; None if it can.
+
+    frames of several instants, and a type that shows itself    an oscillation may seem to keep its sign
+    actuators that bring a surface back over several frames,    the surface may be on its way back
+    and a type that holds the surface
+    neither a course nor a relation                             no inequality is known
+    """
     config = tape.alarm.diagnosis.types_config
     if TYPES[kind].has_shown is not None and not config.single_instant:
         return OSCILLATION_AT_STOP
@@ -112,7 +118,9 @@ def hypothesis_of_type(tape: Tape, surface: int, fault_type: int) -> Hypothesis:
     G = tape.slope[:, e]
     spread = tape.spread[:, e]
     axes = diagnosis.estimators[e].active_axes
-    if diagnosis.types_config.frames_per_block > 1:  # blocks: the axis on which no effect changes its sign
+    if (
+        diagnosis.types_config.frames_per_block > 1
+    ):  # over a block, the axes weigh a varying position differently
         axes = (diagnosis.layout.dominant_axis_by_surface[surface],)
     low, high = theta_span(*travel_rad(tape, surface))
     offset = (gain - 1.0) * Gu
@@ -129,9 +137,10 @@ def hypothesis_of_type(tape: Tape, surface: int, fault_type: int) -> Hypothesis:
 def candidate_inequalities(
     hypothesis: Hypothesis, history: History, alarm_frame: int, last_frame: int
 ) -> Iterator[list[Term]]:
-    """Inequalities that may exclude a hypothesis by frames up to last_frame: of single frames, if theta may
-    change in each; otherwise of two frames since the alarm that one theta does not explain, or of one of the
-    last three. None needs a frame before the hypothesis's first, because no effect is known there.
+    """Inequalities that may exclude a hypothesis by frames up to last_frame: of each of the last two frames,
+    if theta may change in each; otherwise, of the frames since the alarm that health does not explain, two
+    that one theta does not explain, or one of the last three. None needs a frame before the hypothesis's
+    first, because no effect is known there.
     """
     if hypothesis.theta == ANY:
         for frame in range(max(last_frame - 1, hypothesis.first_frame), last_frame + 1):

@@ -184,7 +184,8 @@ class LikelihoodRatio:
 
     @property
     def sides(self) -> tuple[float, float]:
-        """Evidence, and the limit that it must exceed."""
+        """Evidence, and the limit that it must exceed; with the sense "less", -N - max(0, -N_f) is in place
+        of |N|, the sum for the innovation (`sums`)."""
         (N, D, *constants), N_f, room = self.sums()
         root = self.level * sqrt(D) if D >= 0.0 else nan
         evidence = -N - max(0.0, -N_f) if self.sense == "less" else abs(N)
@@ -200,7 +201,7 @@ def _null_for_zero(values: np.ndarray) -> list[float | None]:
 @kernel
 def add_whitened_frames(blocks, inputs, drift, jitter, bounded, foreseen, keep, pace, states, sums, dt):
     """Run a filter, blocks (1,), over the frames of a `LikelihoodRatio`, and add w.g of each frame to `sums`
-    (columns,): g, the whitened input of each column; w = S^-1 g of column 1, the signature. See
+    (columns,): g (2,), the whitened input of each column; w = S^-1 g of column 1, the signature. See
     `likelihood.accumulate_tests`.
 
     inputs (frames, columns, n); drift (frames, n, n); jitter, bounded, foreseen (frames, n): of n axes; keep,

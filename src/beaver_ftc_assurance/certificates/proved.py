@@ -40,14 +40,14 @@ def proof(scenario: Scenario, log: Log) -> Proof:
 
 
 def _log(frames: np.ndarray, flown: Iterable[int], scenario: Scenario, recorder: Recorder) -> MemoryLog:
-    """A log of all frames, with the columns that a certificate needs. Advances the frames and records
-    them."""
+    """A log of all frames, with the columns that a certificate needs, except `watch_missing`. Advances the
+    frames and records them. further: column -> value of the last frame."""
     log = MemoryLog()
     surfaces = scenario.airframe.surfaces
     names = estimator_names(scenario.fdi.fault_class, scenario.airframe)
     columns = ["t_s", *(f"{axis}_{end}" for end in MEASURED_MODEL_BOUND for axis in AXES), "detected"]
     columns += [f"fie_{name}_excluded" for name in names]
-    shares: dict[str, float] = {}
+    further: dict[str, float] = {}
     rows = []
     for k in flown:
         recorder.keep()
@@ -55,13 +55,13 @@ def _log(frames: np.ndarray, flown: Iterable[int], scenario: Scenario, recorder:
         diagnosis = frame.diagnosis
         vectors = frame.rates_rad_s, frame.model_rad_s2, diagnosis.declared_bounds.eta_bar_rad_s2
         if scenario.fdi.statistical:
-            shares = chance.likelihood_shares(diagnosis, surfaces)
+            further = chance.likelihood_shares(diagnosis, surfaces)
         if diagnosis.sensor_monitor.enabled:
             monitor = diagnosis.sensor_monitor
-            shares |= {"watch_share": monitor.top_ratio, "watch_test": monitor.worst_test_index}
+            further |= {"watch_share": monitor.top_ratio, "watch_test": monitor.worst_test_index}
         # The order of the columns.
-        numbers = [frame.alarmed, *diagnosis.is_estimator_excluded, *shares.values()]
+        numbers = [frame.alarmed, *diagnosis.is_estimator_excluded, *further.values()]
         rows.append(np.concatenate([[k / scenario.rate_hz], *vectors, numbers]))
-    log.open([*columns, *shares])
+    log.open([*columns, *further])
     log.write(np.array(rows))
     return log

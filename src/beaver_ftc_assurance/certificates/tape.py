@@ -1,5 +1,5 @@
 """Record internal quantities of the diagnosis during a flight: in a ring buffer of the last frames up to the
-alarm, and of every frame after it.
+alarm, and of every frame after it, up to MAX_FRAMES_AFTER_ALARM.
 
 The quantities are copied as *words* of 8 bytes out of the flight's record, an array (1,) of `frame_dtype`.
 """
@@ -36,9 +36,9 @@ MAX_FRAMES_AFTER_ALARM = 1 << 16  # frames kept after the alarm; the memory is u
 class Tape:
     """Frames `first` to `first + frames - 1` of the flight, rows of its log.
 
-    alarm, last: the flight at the alarm and at its end. since: the frame with which the diagnosis began.
-    names: of the isolation estimators. kept: name -> quantity (frames, ...), which is also an attribute of
-    the tape:
+    alarm, last: the flight at the alarm (without one, at its end) and at its end. since: the frame with which
+    the diagnosis began. names: of the isolation estimators. kept: name -> quantity (frames, ...), which is
+    also an attribute of the tape:
 
         offset, slope, spread (estimators, 3)   effect of each estimator's fault, rad/s2; slope: for a unit
                                                 of the fault's parameter
@@ -150,8 +150,8 @@ class Recorder:
 
         first: the first frame that is in the ring for the first event and for the alarm, not before the
         diagnosis began or the last alarm was withdrawn. end: the frame after the last one, `after` frames
-        from the last event on, not after a restart of the diagnosis. before: rows of the ring with the frames
-        up to the alarm.
+        from the last event on, as far as frames are kept, not after a restart of the diagnosis. before: rows
+        of the ring with the frames up to the alarm.
         """
         last = FrameReadout(self._last[0])
         config = self._scenario.fdi
@@ -181,7 +181,8 @@ class Recorder:
 def keep_frame(record, always, early, kept, ring, alarm, state):
     """Copy words of a record (words,): those `always` in every frame, those `early` up to the alarm. Up to
     the alarm they go into a ring of rows, as the first rows of `kept` and of `ring`; after it into the rows
-    of `kept` behind the ring. At the alarm, `alarm` becomes a copy of the record.
+    of `kept` behind the ring, until `kept` is full. At the alarm, `alarm` becomes a copy of the record. If
+    both flags are cleared, the ring goes on.
 
     state (5,), by position: SEEN, number of frames so far; ALARM, frame of the alarm, or -1; CLEAR, frame in
     which the last alarm was withdrawn; FLAG and OTHER_FLAG, positions in the record of the two alarm flags.

@@ -170,7 +170,8 @@ def _of_formula(text: str, formula: Formula, rate_hz: float, amounts: Metrics, l
 
 
 def _of_handling(bar: OfHandling, scenario: Scenario, amounts: Metrics, log: Watched) -> list[Row]:
-    """A part for each mode of motion: whether its level of handling qualities is good enough."""
+    """A part for each limit on a mode of motion: whether its level of handling qualities is good enough; one
+    part, not shown, if the aircraft was lost."""
     from beaver_ftc.studies import HANDLING_LIMITS as LIMITS
     from beaver_ftc.studies import where_ended, where_trimmed
 
@@ -191,7 +192,8 @@ def _of_handling(bar: OfHandling, scenario: Scenario, amounts: Metrics, log: Wat
 
 
 def _of_margins(bar: OfMargins, scenario: Scenario) -> list[Row]:
-    """The least gain margin and the least phase margin over all surfaces and losses, a part each."""
+    """The least gain margin and the least phase margin over all surfaces and losses, a part each; one part,
+    not shown, without a loop."""
     from beaver_ftc.studies import margins_at as at
     from beaver_ftc.studies import refuse_laws_without_margins as refuse_other_laws
 
@@ -212,8 +214,9 @@ def _of_margins(bar: OfMargins, scenario: Scenario) -> list[Row]:
 
 
 def cells(columns: Mapping[str, np.ndarray], scenario: Scenario) -> list[int]:
-    """Numbers of the cells of the envelope in which the flight was after its first fault. The number of a
-    cell is (number of altitude bands) * (airspeed band) + (altitude band)."""
+    """Numbers of the cells of the envelope in which the flight was, inside the envelope, from its first fault
+    on; without a fault, from its start on. The number of a cell is (number of altitude bands) * (airspeed
+    band) + (altitude band)."""
     slowest, fastest = scenario.airframe.envelope.airspeed_mps
     since = min((fault.at_s for fault in scenario.faults), default=0.0)
     counted = (columns["t_s"] >= since) & (columns["envelope_valid"] > 0.5)

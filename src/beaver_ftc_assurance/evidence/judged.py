@@ -2,9 +2,9 @@
 envelope by flights; sources and versions.
 
 A *part* is one condition of a requirement with its result (`flown.part`). A requirement on each flight has
-parts of each flight. A requirement on a sweep (`bar` of type sweep) has a part for each statistic of the
-sweep, which counts as a part of the flight that contributes the worst value. The worst part decides the
-verdict and the margin.
+parts of each flight. A requirement on a sweep (`bar` of type sweep) has a part for each limit on a statistic
+of the sweep, which counts as a part of the flight that contributes the worst value. The worst part decides
+the verdict and the margin.
 """
 
 import io
@@ -72,7 +72,8 @@ def command(plan: EvidencePlan, flight: str) -> str:
 
 
 def _requirement(plan: EvidencePlan, requirement: Requirement, rows: Sequence[Row]) -> Document:
-    """A requirement with its verdict and margin, its worst flight, and the flights that do not meet it."""
+    """A requirement with its verdict and margin, its worst flight, and the first MOST_NAMED flights that do
+    not meet it."""
     sources = plan.over[requirement.id]
     if isinstance(requirement.bar, OfSweep):
         results = [result for name in sources for result in _of_sweep(plan, requirement.bar, name, rows)]
@@ -223,12 +224,12 @@ def _of_statistic(bound: Document, estimate: Document) -> Row:
 
 
 def _coverage(aircraft: Aircraft, rows: Sequence[Row]) -> Document:
-    """For one aircraft: the number of flights with each fault on each surface, by cell of the envelope. Cell
-    k has the airspeed band k // (number of altitude bands) and the altitude band k % (number of altitude
-    bands), as in `flown.cells`.
+    """For one aircraft: the number of flights with each fault on each surface, by cell of the envelope;
+    failed flights do not count. Cell k has the airspeed band k // (number of altitude bands) and the altitude
+    band k % (number of altitude bands), as in `flown.cells`.
 
-    counts: (surface, fault type, cell) -> number of flights; surface and type of a flight without a fault are
-    `none`.
+    counts: (surface, fault type, cell) -> number of flights; surface and type of a flight without a fault of
+    a surface are `none`.
     """
     slowest, fastest = aircraft.envelope.airspeed_mps
     width = (fastest - slowest) / BANDS

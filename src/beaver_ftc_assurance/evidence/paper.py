@@ -119,8 +119,9 @@ def _cell(cell: str, size: float, table: Table) -> Any:
 
 
 def _widths(table: Table, width: float) -> list[float]:
-    """Widths of the columns, points, in proportion to the longest cell of each, at most 40 letters, and the
-    first MOST_OF_HEAD letters of its header. Of two columns, the first has 17 % of the width.
+    """Widths of the columns, points, in proportion to 4 letters more than the longest of its cells, at most
+    40 letters, and of the first MOST_OF_HEAD letters of its header. Of two columns, the first has 17 % of the
+    width.
     """
     columns = list(zip(table.head, *table.rows, strict=True))
     if len(columns) == 2:

@@ -230,7 +230,8 @@ class _Reading:
             return None
 
     def _fits(self, formula: Formula, source: Source, at: Location) -> None:
-        """Add a mistake if the logs of a source are too short for a formula, or lack one of its columns."""
+        """Add a mistake if the logs of a source are too short for a formula, or lack one of its columns. A
+        formula that looks ahead without end fits each log."""
         ahead = formula.looks_ahead_s
         duration_s = source.base.duration_s
         if duration_s < ahead < inf:

@@ -69,7 +69,8 @@ class Source:
 
     @property
     def sha256(self) -> str:
-        """SHA-256 of the resolved scenario or sweep, and of the files of its aircraft."""
+        """SHA-256 of the resolved scenario or sweep without description and expectations, and of the files of
+        its aircraft."""
         aircraft = digest_of_aircraft(self.aircraft.folder)
         left_out = {"description", "expect"}
         if isinstance(self.what, Sweep):

@@ -101,7 +101,8 @@ class CompiledLaw(NamedTuple):
     `control.NAME` for a file NAME.py. The law's kernels alone write that record.
 
     Lazy kernels (compiled/), called once a frame with `control` (control/state.py), `assessment` (what the
-    diagnosis says of each surface) and the records `prediction` and `measured`:
+    diagnosis says of each surface) and the records `prediction` and `measured`; without `accommodate`, a law
+    has that of accommodation.py:
 
         accommodate(control, assessment, faults, prediction, measured)   effectiveness of each surface
         command(control, assessment, faults, prediction, measured, mode, t)   deflection of each surface

@@ -13,8 +13,10 @@ assessment of the diagnosis: an isolated loss scales the command, a surface that
 is parked, an offset is subtracted, and a slow surface is waited for. A law that is informed of the truth (an
 oracle) takes the true faults of the instant instead; no other law reads them.
 
-The laws divide by the effectiveness in `output`. It is rate limited, so that a decision never kicks the
-surfaces. A surface whose effectiveness is below `least_effectiveness` is given up: nothing is divided by it.
+The laws divide by the effectiveness in `output`. Its rate is limited, so that a decision does not kick the
+surfaces, except if the assessment applies at once (`start_of`), if a law's observer gives the surface up, or
+if the law is informed. A surface whose effectiveness is below `least_effectiveness` is given up: nothing is
+divided by it.
 
 Records among the arguments, and the file that defines each:
 
@@ -124,8 +126,8 @@ def surfaces_dtype(n: int) -> np.dtype:
 
 
 def configure(surfaces: np.void, config: ControlConfig, informed: bool, dt_s: float) -> None:
-    """Fill the record (`surfaces_dtype`); informed: whether the law receives the true faults. Its step is
-    then not limited."""
+    """Fill the record (`surfaces_dtype`); informed: whether the law receives the true faults. The step of an
+    effectiveness is then not limited."""
     step = np.inf if informed else config.effectiveness_rate_per_s * dt_s
     fill(surfaces["config"], least_effectiveness=config.least_effectiveness, effectiveness_step=step)
     surfaces["output"]["effectiveness"] = 1.0
@@ -148,7 +150,7 @@ def accommodate(control, assessment, faults, prediction, measured):
 
 @kernel
 def begin_frame(output, authority_lost):
-    """Begin a frame with no surface given up or parked; authority_lost: whether a surface is slow."""
+    """Begin a frame with no surface given up or parked yet; authority_lost: whether a surface is slow."""
     output.given_up[:], output.parked[:], output.authority_lost = 0, 0, authority_lost
 
 
@@ -177,8 +179,8 @@ def follow_truth(surfaces, faults, u):
 
 @kernel
 def start_of(output, assessment, s):
-    """Effectiveness of surface s from which the step of this frame begins. If the assessment applies at once
-    (a jam, or a precise estimate), it begins at the target, which bypasses the rate limit."""
+    """Effectiveness of surface s from which the step of this frame begins: the present one. If the assessment
+    applies at once (a jam, or a precise estimate), the assessed one, which bypasses the rate limit."""
     return assessment.effectiveness[s] if assessment.at_once[s] else output.effectiveness[s]
 
 
@@ -199,7 +201,7 @@ def give_up(output, s):
 @kernel
 def estimate_unknown(output, config, assessment, faults, prediction, y):
     """Fill output.unknown (3,) rad/s2: for an informed law the true pitch acceleration by Cm_alpha3, for
-    others that use the verdict the estimate of the diagnosis."""
+    others that use the verdict the estimate of the diagnosis, otherwise 0."""
     output.unknown[:] = 0.0
     if config.informed:
         output.unknown[PITCH] = unanticipated_pitch(prediction.design, y, faults.Cm_alpha3)
@@ -221,7 +223,7 @@ def park_failed_surfaces(output, assessment, faults, informed):
     law's observer has withdrawn it, or the diagnosis gives it up and no effectiveness is left.
 
     A parked surface is commanded to its trim. If it comes loose, it moves there, which the diagnosis detects.
-    From then on the reference is governed (hedged and scaled, laws/reference.py).
+    Once a surface has been parked, the reference is governed (hedged and scaled, laws/reference.py).
     """
     for s in range(output.parked.size):
         immovable = informed and faults.immovable[s]

@@ -71,7 +71,7 @@ def allocation_dtype(n: int) -> np.dtype:
     hand_over_step   change of hand_over in a frame
     problem          of least_squares.py, used if `layout.general`
     command (n,)     rad
-    saturated (n,)   whether a surface is commanded to a stop
+    saturated (n,)   whether a stop limits the command of a surface
     hand_over        how far pitch is handed over to the stand-in, 0 to 1
     lost_share       the part of pitch that the main surface has lost, 0 to 1
     transfer_share   the part of pitch that the stand-in carries now, 0 to 1 (`hand_over_pitch`)
@@ -144,16 +144,16 @@ def within_stops(layout, s, deflection):
 
 @kernel
 def clip(output, layout, s, deflection):
-    """Limit a deflection (rad) to the travel of surface s and note saturation."""
+    """Limit a deflection (rad) to the travel of surface s; saturated: whether this changes it."""
     limited = within_stops(layout, s, deflection)
     output.saturated[s] = limited != deflection
     return limited
 
 
 @kernel
-def divide(moment, effectiveness):
-    """moment / effectiveness, and 0 for a surface that is given up (effectiveness 0)."""
-    return moment / effectiveness if effectiveness != 0.0 else 0.0
+def divide(moment, divisor):
+    """moment / divisor, and 0 for a divisor of 0, as that of a surface that is given up."""
+    return moment / divisor if divisor != 0.0 else 0.0
 
 
 @kernel
@@ -191,8 +191,9 @@ def lateral(axes, output, layout):
 
         G_roll,a u_a + G_roll,r u_r = roll,    G_yaw,a u_a + G_yaw,r u_r = yaw
 
-    When one saturates, the other gives as much of its own axis as it can. The order is therefore a, r, a: r
-    is computed with the a that the stops allow, and a again with the r that they allow.
+    If the determinant is 0, a is 0 at first. When one saturates, the other gives as much of its own axis as
+    it can. The order is therefore a, r, a: r is computed with the a that the stops allow, and a again with
+    the r that they allow.
     """
     G, u = axes.G, output.command
     a, r = layout.main[ROLL], layout.main[YAW]
@@ -216,7 +217,7 @@ def pitch(axes, output, layout, effectiveness, share, probe):
     Before the hand-over (share 0), the elevator e carries the whole demand. After it (share 1), the flap f
     carries all but the trimmed moment of a healthy elevator, which the elevator keeps. The upward travel of
     the flap is short: what it cannot give returns to the elevator. Without a flap the elevator carries what
-    it can.
+    it can. Both are limited to their travel.
 
         u_f = trim_f + share ((demand - hold) / G_f - trim_f) + probe,    hold = G_e / effectiveness trim_e
         u_e = (demand - G_f u_f) / G_e
@@ -348,9 +349,9 @@ def hand_over_pitch(allocation, reallocated, at_once, remains, least):
         lost_share = 1 - remains, or 1 if remains < least
         transfer_share = smoothstep(hand_over) lost_share        smoothstep(1) if nothing remains
 
-    at_once: whether the lost part is handed over in one frame, as after a jam. remains: effectiveness of the
-    main surface. While pitch is handed back, lost_share stays: the estimate of the main surface may return to
-    1 in one frame, but the command must not jump.
+    at_once: whether the lost part is handed over in one frame, as after a jam. remains: remaining share of
+    the authority in pitch (`remaining`). While pitch is handed back, lost_share stays: the estimate of the
+    main surface may return to 1 in one frame, but the command must not jump.
     """
     config, output = allocation.config, allocation.output
     if reallocated:

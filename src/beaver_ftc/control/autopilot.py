@@ -188,9 +188,10 @@ def acceleration_per_power(autopilot, power, y):
 
 @kernel
 def change_allowed_power(autopilot, power, at_stop, y):
-    """Reduce the allowed power, by CUT_INHG_S, while the rudder is at its stop (at_stop): it can hold no more
-    yawing moment of the propeller then, whatever its estimated effectiveness. Then raise it again, by
-    RAISE_INHG_S. It never falls below the power whose yawing moment sideslip alone holds."""
+    """Reduce the allowed power, by CUT_INHG_S from the present one, while the rudder is at its stop
+    (at_stop): it can hold no more yawing moment of the propeller then, whatever its estimated effectiveness.
+    Then raise it again, by RAISE_INHG_S. It never falls below the power whose yawing moment sideslip alone
+    holds, nor rises above high_power."""
     high = autopilot.high_power
     if at_stop:
         lowest = ceiling(power, y, autopilot.dpt_cubed_held_by_sideslip ** (1.0 / 3.0))
@@ -202,8 +203,8 @@ def change_allowed_power(autopilot, power, at_stop, y):
 
 @kernel
 def highest_power(autopilot, power, E, y):
-    """The highest setting with the remaining effectiveness `E` of the rudder: the propeller of the Beaver
-    yaws the aircraft with dpt^3, and what the rudder lacks, sideslip makes up for.
+    """The highest setting with the remaining effectiveness `E` of the rudder, at most the allowed power: the
+    propeller of the Beaver yaws the aircraft with dpt^3, and what the rudder lacks, sideslip makes up for.
 
         dpt^3 held = E highest_dpt^3 + (1 - E) dpt_cubed_held_by_sideslip
 
@@ -240,7 +241,8 @@ def path_angle_to_fly(autopilot, measured, push):
 
 @kernel
 def glide_path_angle(autopilot):
-    """Path angle at which gravity brings the airspeed to where it is commanded, rad:
+    """Path angle at which gravity brings the airspeed to where it is commanded, rad, within MOST_PATH_RAD of
+    gamma_trim:
 
     gamma_c = gamma_trim - (V_c' + K (V_c - V) + M) / g,    M: missing_acceleration, m/s2
     """
@@ -308,7 +310,8 @@ def bank_angle_rate(autopilot, attitude):
         share = 1 - roll_loss engines_alone_yaw_share (1 - LOOP_GAIN_SHARE_BY_POWER)
         M <- M + roll_loss dt share K_i (phi_c - phi)        unless limited
 
-    The loop is slower where engines alone yaw and roll the aircraft. M: missing_roll_rate, rad/s.
+    The loop is slower where engines alone yaw and roll the aircraft. phi_c is within bank_limit; M:
+    missing_roll_rate, rad/s.
     """
     gain, roll_loss = autopilot.gain, autopilot.roll_loss_share
     share = 1.0 - roll_loss * autopilot.engines_alone_yaw_share * (1.0 - LOOP_GAIN_SHARE_BY_POWER)
@@ -383,7 +386,8 @@ def set_power(autopilot, power, y, path, push):
     V_c: airspeed_to_fly; M: missing_acceleration, integrated unless the power is limited. While power stands
     in for a lost pitch, K is 0 and power_airspeed is set: the law of power.py has an airspeed loop of its
     own, which can hold V_c within MAX_FROM_RECENT_MPS of the recent airspeed. At either end of the range, a
-    room is kept for engines that alone yaw the aircraft. path: gamma_c, rad.
+    room is kept for engines that alone yaw the aircraft; the upper end is full_power, or `ceiling` if it is
+    lower. path: gamma_c, rad.
     """
     V, V_c = autopilot.airspeed, autopilot.airspeed_to_fly
     error = V_c - V

@@ -116,7 +116,7 @@ def set_up_autopilot(autopilot: np.void, control: np.void, declared: Declared) -
 
 
 def _gains(aircraft: Aircraft) -> dict[str, float]:
-    """GAINS, with an airspeed loop that is slower if the engine lags by tau s:
+    """GAINS, with an airspeed loop that is slower if power holds the airspeed and the engine lags by tau s:
 
         speed / slower,    speed_i / slower^2,    slower = 1 + tau / airspeed_s
 

@@ -1,8 +1,8 @@
 """Engines as effectors: they take what surfaces no longer reach.
 
-If the surface that leads an axis is given up or at its stop, it does not give a part of the demand, the
-shortfall e, rad/s2. The engines are asked for the integral w of the shortfall, rad/s2. With the lag of the
-engines, s, the loop has a damping of 0.7:
+If the surfaces of an axis have lost their authority, or the one that leads it is at its stop, they do not
+give a part of the demand, the shortfall e, rad/s2. The engines are asked for the integral w of the shortfall,
+rad/s2. With the lag of the engines, s, the loop has a damping of 0.7:
 
     w' = e / T,   T = 2 lag,        w / demand = 1 / (T s (lag s + 1) + 1)
 
@@ -53,7 +53,8 @@ ENGINES = record(config=ENGINES_CONFIG, memory=ENGINES_MEMORY, output=ENGINES_OU
 
 
 def configure_engines(engines: np.void, declared: Declared) -> None:
-    """Fill the record (dtype ENGINES); it stays empty where no engine is an effector, or none may be used."""
+    """Fill the record (dtype ENGINES); it stays empty where no engine is an effector, none may be used, or
+    the aircraft's file has no setting of power."""
     aircraft, dt, config = declared.aircraft, 1.0 / declared.rate_hz, engines["config"]
     name_and_setting, thrust = aircraft.file.power_setting, aircraft.engine.thrust
     may_use = row_of(declared.control.law).uses_verdict and declared.control.power.enabled
@@ -83,8 +84,9 @@ def effects_of_engines(declared: Declared) -> np.ndarray:
 
 @kernel
 def surface_reaches_demand(layout, saturated, surfaces, i):
-    """Whether the surface that leads axis i is neither given up nor at its stop; saturated (surfaces,):
-    whether each is at its stop."""
+    """Whether the surface that leads axis i is not at its stop, and the surfaces of the axis keep
+    `least_effectiveness` of its authority (`allocation.remaining`); saturated (surfaces,): whether each is at
+    its stop."""
     given_up = remaining(layout, surfaces.output.effectiveness, i) < surfaces.config.least_effectiveness
     return not given_up and saturated[layout.main[i]] == 0
 

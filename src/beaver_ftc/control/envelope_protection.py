@@ -46,9 +46,8 @@ MOST_BANK_DEG = 30.0  # largest bank of a healthy aircraft
 # Part of the flap's travel that is kept at the ends of the airspeeds that can be held. Of 0, 0.7, 1.5 and 3
 # deg, it is the one with which most flights with a jam were kept.
 FLAP_RESERVE_DEG = 0.7
-MAX_AIRSPEED_RATE_MPS2 = (
-    1.0  # rate at which a limit moves the command: about as fast as drag slows the aircraft
-)
+# Largest rate at which a limit moves the airspeed to fly: about as fast as drag slows the aircraft.
+MAX_AIRSPEED_RATE_MPS2 = 1.0
 THRUST = "dpt"  # the signal that stands for the engine
 STEP = 1e-30  # of a complex step: far below rounding, so the derivative is exact to rounding
 ITERATIONS, CLOSE = 12, 1e-9  # of Newton's method; imbalance of a coefficient that counts as zero
@@ -78,7 +77,8 @@ HOLDING = record(
 @kernel
 def limit_airspeed_to_fly(autopilot, layout, surfaces, u, unexplained, y, t):
     """Set autopilot.airspeed_to_fly of this frame, at t s: the nearest to the commanded airspeed that can be
-    held. While elevator and flap are healthy, or without a table, any airspeed counts as one that can.
+    held. Any airspeed counts as one that can, without a table, while elevator and flap have their whole
+    effectiveness, and in the first HOLD_SETTLED_S after that.
 
     u (n,) rad: where the surfaces are. unexplained: d / G, rad.
     """
@@ -176,9 +176,14 @@ def approach_airspeed_to_fly(autopilot):
 
 @kernel
 def record_limits_in_force(autopilot, main, effectiveness, t):
-    """Record which limits are in force at t s: those of the airspeed if they change the command by more than
-    NOTED_MPS, and that of the bank if ailerons or rudder have lost effectiveness. main (3,): the surface that
-    leads each axis."""
+    """Record which limits are in force at t s; main (3,): the surface that leads each axis.
+
+    limits      recorded while                                       in force if
+    airspeed    an airspeed is commanded                             it changes the command by more than
+                                                                     NOTED_MPS
+    bank        ailerons or rudder have lost effectiveness           it is, smoothed over ACTING_S, more
+                                                                     than NOTED_RAD below that in health
+    """
     holding, command = autopilot.holding, autopilot.command[SPEED]
     if autopilot.is_commanded[SPEED]:
         record_limit(holding, FASTEST, holding.fastest, holding.fastest < command - NOTED_MPS, t)

@@ -27,7 +27,7 @@ import numpy as np
 from beaver_ftc.compiled import kernel, record, sized
 
 LOW, FREE, HIGH = -1, 0, 1
-SLACK = 1e-10  # of the mean of B v B'
+SLACK = 1e-10  # of the mean of the diagonal of B v B'
 LEAST_SLACK = 1e-14  # (rad/s2)^2, as B v B'
 ROUNDING = 1e-12  # rad: a surface that would move inside its limit by less stays there
 
@@ -139,8 +139,8 @@ def blocking_surface(problem, B):
 
 @kernel
 def release(problem, B):
-    """Free the surface that would move farthest inside its limit, by side (u - (p + v B' y)) rad; returns
-    whether there is one. side is 0 for a free surface."""
+    """Free the surface that would move farthest inside its limit, by side (u - (p + v B' y)) rad, and by more
+    than ROUNDING; returns whether there is one. side is 0 for a free surface."""
     farthest, largest = -1, ROUNDING
     for s in range(problem.u.size):
         inside = problem.side[s] * (problem.u[s] - wanted(problem, B, s))

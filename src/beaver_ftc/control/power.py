@@ -41,7 +41,7 @@ from beaver_ftc.diagnosis.state import PITCH, YAW
 from beaver_ftc.scenario.declared import Declared
 
 LEAST_LACK_RAD_S2 = 0.05  # smallest shortfall in pitch that counts: 2 to 3 inHg give so much
-WHOLE_RANGE_S = 5.0  # time in which a lever goes from stop to stop
+WHOLE_RANGE_S = 5.0  # time in which a lever goes from stop to stop; manifold pressure has `rate_inhg_s`
 YAW_SHARE = 0.5  # share of the rudder's travel that engine power may need; the rest is there to fly with
 
 # enabled                      whether the law may use the engine (`is_at_hand`)
@@ -119,8 +119,8 @@ def _slipstream_limits(declared: Declared, layout: np.void) -> tuple[float, floa
 
         |Cn_dpt3| dpt^3 = YAW_SHARE |Cn_dr| rudder_rad
 
-    Cn_dr: sum over the terms of all surfaces that move yaw; rudder_rad: the travel of the rudder to its
-    nearer stop. highest_dpt is infinite if the propeller has no yawing moment.
+    Cn_dr: sum over the terms of all surfaces that move mainly yaw, without signals; rudder_rad: the travel of
+    the rudder to its nearer stop. highest_dpt is infinite if the propeller has no yawing moment.
     """
     initial: Any = declared.initial
     aircraft, rudder = declared.aircraft, layout["main"][YAW]

@@ -14,8 +14,8 @@ import numpy as np
 from beaver_ftc.compiled import fill, kernel, record
 from beaver_ftc.scenario.diagnosis import Probing
 
-# amplitude rad: largest deflection of the flap; step rad: change of the phase in a frame; frames: largest
-# number of frames of the movement, 0 for no probe.
+# amplitude rad: largest deflection of the flap; step rad: change of the phase in a frame; frames: number of
+# frames after which the movement ends when it is next at rest, 0 for no probe.
 CONFIG = record(amplitude=float, step=float, frames=int)
 # deflection rad of the flap; probed: frames of the present movement, 0 without one; from_s, to_s: when it
 # began and ended, s, -1 for never.
@@ -36,7 +36,7 @@ def configure_probe(probe: np.void, probing: Probing | None, dt: float) -> None:
 @kernel
 def advance_probe(probe, wanted, t):
     """Bring the probe to the next frame, at t s. It begins once in a flight, when it is wanted. It ends at
-    rest, that is after a whole period, once it is no longer wanted or has its largest number of frames."""
+    rest, that is after a whole period, once it is no longer wanted or has lasted config.frames."""
     config, memory = probe.config, probe.memory
     if memory.probed == 0:
         if not wanted or memory.from_s >= 0.0:

@@ -44,8 +44,8 @@ command = one_of(dict(enumerate(_COMMANDS[1:], 1)), _COMMANDS[0])
 CONFIG = record(law=int, uses_verdict=int, reallocates=int, informed=int)
 
 # Records (stage, part) that a law takes over from the law before it. KEPT: the state of the reference, the
-# positions of surfaces and engine. KNOWN: what the law before assumed of the surfaces, unless it was informed
-# of the truth and the new law is not. All other records restart.
+# positions of surfaces and engine, the probe. KNOWN: what the law before assumed of the surfaces, unless it
+# was informed of the truth and the new law is not. All other records restart.
 KEPT = ("reference", "output"), ("allocation", "output"), ("probe", "memory"), ("power", "output")
 KNOWN = ("surfaces", "output"), ("power", "memory")
 
@@ -62,7 +62,7 @@ def control_dtype(n: int) -> np.dtype:
 
 def configure(control: np.void, declared: Declared, travel: np.ndarray) -> None:
     """Fill the records that all laws share; travel (2, n) rad: the stops. `configure_law` fills that of the
-    law. The order matters: allocation reads the frame of the reference, and power the layout of
+    law. The order matters: allocation reads the length of a frame from the reference, and power the layout of
     allocation."""
     config, dt, row = declared.control, 1.0 / declared.rate_hz, row_of(declared.control.law)
     control["config"] = row.place, row.uses_verdict, row.reallocates, row.informed
@@ -82,7 +82,7 @@ def configure_law(control: np.void, prediction: np.void, declared: Declared, y: 
         law.configure(control[row.file], control, prediction, declared, y)
 
 
-def is_told_no_more(new: np.void, before: np.void) -> bool:
+def loses_truth(new: np.void, before: np.void) -> bool:
     """Whether the law in `before` was informed of the truth and the one in `new` is not."""
     return bool(before["config"]["informed"] and not new["config"]["informed"])
 
@@ -91,16 +91,16 @@ def take_over(new: np.void, before: np.void, learnt: np.ndarray) -> None:
     """Let a law, configured in `new`, take over from the one in `before` without a bump: the records in KEPT
     and KNOWN go on, and its integrators begin with the present demand.
 
-    If the law loses the truth (`is_told_no_more`), the effects of the truth must not go on: KNOWN restarts,
+    If the law loses the truth (`loses_truth`), the effects of the truth must not go on: KNOWN restarts,
     and so do the hand-over of pitch, the governing of the reference, and the integrators.
 
     learnt (3,) rad/s2: part that the network of the diagnosis explains. source: the records with which the
     integrators may begin; unexplained (3,) rad/s2: acceleration that the law in them attributes to no model.
     """
-    loses_truth = is_told_no_more(new, before)
-    for stage, part in KEPT if loses_truth else (*KEPT, *KNOWN):
+    restarts = loses_truth(new, before)
+    for stage, part in KEPT if restarts else (*KEPT, *KNOWN):
         new[stage][part] = before[stage][part]
-    if loses_truth:
+    if restarts:
         for name in ("hand_over", "lost_share", "transfer_share"):
             new["allocation"]["output"][name] = 0.0
         reference = new["reference"]["output"]

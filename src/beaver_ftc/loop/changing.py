@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from beaver_ftc.control.autopilot import forget_losses
-from beaver_ftc.control.state import is_told_no_more, take_over
+from beaver_ftc.control.state import loses_truth, take_over
 from beaver_ftc.diagnosis.schemes import prepare_takeover
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.assembly import assemble
@@ -123,7 +123,7 @@ def take_law(frame: np.void, new: np.void) -> None:
     """Put a law, configured in `new`, in the place of another, without a bump."""
     fdi = frame["fdi"]
     learnt = fdi["fdae"]["network"]["output"].copy() if fdi["verdict"]["detected"] else np.zeros(3)
-    if is_told_no_more(new, frame["control"]):
+    if loses_truth(new, frame["control"]):
         forget_losses(frame["autopilot"])
     take_over(new, frame["control"], learnt)
     frame["control"] = new

@@ -54,8 +54,8 @@ def command_surfaces(control, assessment, faults, prediction, by_observer):
         u = trim                            for a surface that is parked
 
     by_observer: whether the law has an observer, which finds what a surface does not do. The stand-in then
-    carries only what the main surface has lost, and from the alarm on the flap takes what an elevator at its
-    stop leaves.
+    carries only what the main surface has lost. If the allocation is not general and the law uses the
+    verdict, the flap takes from the alarm on what an elevator at its stop leaves.
     """
     axes, layout, surfaces, out = control.axes, control.layout, control.surfaces, control.allocation.output
     uses_verdict, effectiveness = control.config.uses_verdict, surfaces.output.effectiveness
@@ -79,8 +79,8 @@ def command_surfaces(control, assessment, faults, prediction, by_observer):
 def complete(control, assessment, measured, t):
     """Fill the shortfall of the demand, and leave it to the engines in pitch and yaw, at t s.
 
-    engines_serve: whether engines may act, from the alarm on, and at any time for a law that is informed of
-    the truth. power_stage: the common lever; engine_stage: the engines that are effectors.
+    engines_serve: whether engines may act: while the alarm stands, and at any time for a law that is informed
+    of the truth. power_stage: the common lever; engine_stage: the engines that are effectors.
     """
     out, surfaces, axes, layout = control.allocation.output, control.surfaces, control.axes, control.layout
     power_stage, engine_stage = control.power, control.engines

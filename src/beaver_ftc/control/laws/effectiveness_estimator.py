@@ -103,8 +103,9 @@ def estimate(estimator, innovation, L_rate, L_disturbance, dt, x, y, effectivene
     """Update w and P with the innovation of all axes (3,) rad/s, axis by axis:
 
         P_jj <- min(P_jj + prior_j dt / FORGOTTEN_S, max(P_jj, prior_j))        old knowledge fades
-        z = innovation_i + observed((effectiveness - 1)' moments_i),    h = observed(moments_i, y)
-        `update` with z = h' w + noise
+        for each axis i
+            z = innovation_i + observed((effectiveness - 1)' moments_i),    h = observed(moments_i, y)
+            `update` with z = h' w + noise
         w <- w - P_s (w_s - limited(w_s)) / P_ss        for each surface s with w_s beyond [-1, 0]
 
     observed: `observer_response`, with L_rate 1 and L_disturbance 1/s (3,), the observer's gains.

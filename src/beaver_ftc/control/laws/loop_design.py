@@ -50,7 +50,8 @@ class Loop:
 
 def lead_of(approach: float) -> float:
     """lead = 1 / approach, from 1 to MOST_LEAD: with it, an actuator that goes the share `approach` of its
-    way in a frame reaches the wanted position after one frame, and never overshoots."""
+    way in a frame, at least 1 / MOST_LEAD, reaches the wanted position after one frame. It never
+    overshoots."""
     return 1.0 / min(max(approach, 1.0 / MOST_LEAD), 1.0)
 
 
@@ -159,8 +160,8 @@ def noise_speed(loop: Loop, s: float, z: np.ndarray, omega: np.ndarray) -> float
 
 @lru_cache(maxsize=64)
 def candidates(loop: Loop, gain_db: float, phase_deg: float) -> tuple[np.ndarray, np.ndarray]:
-    """LEAST_PER_S and the values of s above it that leave the margins, 1/s, ascending, and the noise speed of
-    each, 1/s2.
+    """LEAST_PER_S and the values of s above it, up to the first one that does not leave the margins, 1/s,
+    ascending, and the noise speed of each, 1/s2.
 
     The fastest has s = 1 / (2 delay); delay: that of a frame's hold, of the command and of the gyro, s.
     """
@@ -182,8 +183,8 @@ def fastest(
     loop: Loop, margin: tuple[float, float], noise_rad_s: float, G: float, speed_rad_s: float
 ) -> float:
     """The largest s, 1/s, with these margins (dB, deg), and with a standard deviation of the surface's speed
-    from noise of at most speed_rad_s. Between candidates, log s is linear over the log of the noise speed. G
-    rad/s2 per rad; noise_rad_s: standard deviation of a sample of the gyro."""
+    from noise of at most speed_rad_s; at least LEAST_PER_S. Between candidates, log s is linear over the log
+    of the noise speed. G rad/s2 per rad; noise_rad_s: standard deviation of a sample of the gyro."""
     values, speeds = candidates(loop, *margin)
     if noise_rad_s <= 0.0:
         return float(values[-1])

@@ -111,7 +111,7 @@ def begin(control: np.void, before: np.void, unexplained: np.ndarray, learnt: np
 
 def begin_integrators(law: np.void, unexplained: np.ndarray, fhat: np.ndarray) -> None:
     """Let the integrators of a record of type FEEDBACK stand for the part of `unexplained` that fhat does not
-    explain, both (3,) rad/s2: int e = (fhat - unexplained) / Ki."""
+    explain, both (3,) rad/s2: int e = (fhat - unexplained) / Ki, if Ki > 0."""
     if law["config"]["Ki"] > 0.0:
         law["memory"]["integral"] = (fhat - unexplained) / law["config"]["Ki"]
 

@@ -121,8 +121,8 @@ def schedule_points(declared: Declared, y: np.ndarray) -> np.ndarray:
     return points
 
 
-# xhat and d: rate (3,) rad/s, disturbance (3,) rad/s2. begun: whether the observer has begun. A change of law
-# keeps this record.
+# xhat and d: rate (3,) rad/s, disturbance (3,) rad/s2. begun: whether the observer has begun. `begin` takes
+# this record over from the law before.
 OBSERVER = record(begun=int, rate=3, disturbance=3)
 
 

@@ -72,7 +72,8 @@ def configure(law: np.void, control: np.void, prediction: np.void, declared: Dec
 
 @apart
 def accommodate(control, assessment, faults, prediction, measured):
-    """Bring both parts, effectiveness and network, to this frame (control.CompiledLaw)."""
+    """Bring both parts, effectiveness and network, to this frame (control.CompiledLaw); they adapt while the
+    alarm stands, if the option `adaptation` is set."""
     law, surfaces, main, x = control.zhang2005, control.surfaces, control.layout.main, measured.x
     begin_frame(surfaces.output, False)
     if assessment.detected and law.config.adapts:
@@ -89,8 +90,9 @@ def adapt(law, surfaces, main, saturated, error, G, u, dt):
         sigma = e + c int e
         effectiveness_s <- Proj(effectiveness_s + dt gamma sum_i signal_i G_is u_s)
 
-    error (3,) rad/s: e; G (3, n) rad/s2 per rad; u (n,) rad; gamma: config.gain, c: config.integral_weight.
-    While the surface that leads an axis is at its stop, what the axis misses teaches nothing.
+    s: the surfaces main (3,) that lead the axes; the network only if config.networks. error (3,) rad/s: e; G
+    (3, n) rad/s2 per rad; u (n,) rad; gamma: config.gain, c: config.integral_weight. While the surface that
+    leads an axis is at its stop, what the axis misses teaches nothing.
     """
     config, signal = law.config, law.memory.signal
     for i in range(3):

@@ -135,10 +135,10 @@ def distinguish(fault_a: Candidate, fault_b: Candidate, at: Situation, names: Se
     if fault_a.surface == fault_b.surface and at.in_blocks:
         return _none("with noisy gyros types are told by blocks of frames, not by one", needs)
     if fault_a.surface == fault_b.surface:
-        requirements = [(fault_a.surface, *_types_apart(fault_a, fault_b, at))]
+        requirements = [(fault_a.surface, *_target_of_types(fault_a, fault_b, at))]
     else:
         requirements = [
-            (a.surface, *_surface_shown(a, b, at)) for a, b in ((fault_a, fault_b), (fault_b, fault_a))
+            (a.surface, *_target_of_surface(a, b, at)) for a, b in ((fault_a, fault_b), (fault_b, fault_a))
         ]
     for s, target, numbers in requirements:
         needs[names[s]] = numbers
@@ -166,9 +166,9 @@ def _none(because: str, needs: Document) -> Document:
     return {"separates": False, "because": because, "needs": needs}
 
 
-def _types_apart(fault_a: Candidate, fault_b: Candidate, at: Situation) -> tuple[float | None, Document]:
+def _target_of_types(fault_a: Candidate, fault_b: Candidate, at: Situation) -> tuple[float | None, Document]:
     """The deflection nearest to the present one at which the positions by two types on a surface and by
-    health all differ; None if there is none; and the numbers of `_nearest`.
+    health all differ; None if there is none; and the numbers of `_nearest_target`.
 
         gap > room,    room = least over the axes i of 2 M B_i / |G_is|
 
@@ -184,12 +184,14 @@ def _types_apart(fault_a: Candidate, fault_b: Candidate, at: Situation) -> tuple
     gap = np.maximum(low - high_b, low_b - high)
     # Health must not explain the frame.
     gap = np.minimum(gap, np.minimum(fault_a.off(u), fault_b.off(u)))
-    return _nearest(u, gap, s, at, room, "apart, and off their command,")
+    return _nearest_target(u, gap, s, at, room, "apart, and off their command,")
 
 
-def _surface_shown(fault_a: Candidate, fault_b: Candidate, at: Situation) -> tuple[float | None, Document]:
-    """The deflection nearest to the present one at which fault_a, on surface a, shows in a direction in
-    which surface b of the other fault has no effect; None if there is none; and the numbers of `_nearest`.
+def _target_of_surface(
+    fault_a: Candidate, fault_b: Candidate, at: Situation
+) -> tuple[float | None, Document]:
+    """The deflection nearest to the present one at which fault_a, on surface a, shows in a direction in which
+    surface b of the other fault has no effect; None if there is none; and the numbers of `_nearest_target`.
 
         distance from the command > room,    room = least over the directions d of 2 M |d|.B / |d.G_a|
     """
@@ -199,7 +201,7 @@ def _surface_shown(fault_a: Candidate, fault_b: Candidate, at: Situation) -> tup
         (2.0 * MARGIN * np.abs(d) @ at.bound / abs(d @ at.G[:, a]) for d in _blind_to(b, at, a)), default=inf
     )
     u = _deflections(at, a)
-    return _nearest(u, fault_a.off(u), a, at, room, "off its command")
+    return _nearest_target(u, fault_a.off(u), a, at, room, "off its command")
 
 
 def _deflections(at: Situation, s: int) -> np.ndarray:
@@ -216,7 +218,7 @@ def _blind_to(b: int, at: Situation, a: int) -> Iterator[np.ndarray]:
             yield d
 
 
-def _nearest(
+def _nearest_target(
     u: np.ndarray, difference: np.ndarray, s: int, at: Situation, room: float, words: str
 ) -> tuple[float | None, Document]:
     """The deflection of u (n,) nearest to the present one with difference > room, None if there is none; and

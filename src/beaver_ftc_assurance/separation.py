@@ -7,7 +7,7 @@ A *pair* is an entry of the document: two candidates with the doublet, or with t
 import json
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from itertools import combinations
+from itertools import combinations, islice
 from math import degrees, radians
 from pathlib import Path
 
@@ -96,10 +96,10 @@ def _flown(scenario: Scenario, pair: Document, candidates: Sequence[Candidate]) 
     """The candidates of a pair that remain after the flight with the doublet, and how often the aircraft left
     its envelope in the part of the doublet that is flown (`_with_doublet`)."""
     with _longer(scenario, pair) as flight:
-        exits_before = 0
-        for k in _with_doublet(flight, scenario, pair):
-            if k == _frames(scenario) - 1:  # the last frame before the doublet
-                exits_before = flight.readout.envelope_exits
+        frames = _with_doublet(flight, scenario, pair)
+        list(islice(frames, _frames(scenario)))  # fly to the doublet
+        exits_before = flight.readout.envelope_exits
+        list(frames)  # fly the doublet
         remaining = {*faults_left(flight.readout.diagnosis)}
         both = zip(candidates, pair["candidates"], strict=True)
         left = [words for candidate, words in both if (candidate.surface, candidate.kind) in remaining]

@@ -90,7 +90,8 @@ ROLLING, ROLLING_LAG = 1.9, 2.6
 
 @dataclass(frozen=True)
 class Dryden:
-    """Turbulence of one severity; `none` is still air. Spans and lengths in m, speeds in m/s."""
+    """Turbulence of one severity; `none` is still air. Spans and lengths in m, speeds in m/s. A quantity is
+    that above 2000 ft, unless its docstring names another height."""
 
     severity: Severity = "none"
 

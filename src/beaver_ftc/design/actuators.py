@@ -2,8 +2,8 @@
 
     u[k+1] = u[k] + limited((command - u[k]) (1 - exp(-bandwidth dt))),   |limited| <= rate dt
 
-This is the discretisation of aircraft/actuator.xml, one step a JSBSim frame, so that a healthy surface is
-exactly where the model predicts it. u, command: rad.
+This is the discretisation of aircraft/actuator.xml, one step a JSBSim frame, so that a healthy surface whose
+actuator is the declared one is exactly where the model predicts it. u; command, within the stops: rad.
 """
 
 import numpy as np

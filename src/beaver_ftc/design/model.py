@@ -18,7 +18,7 @@ right.
 *Simplified models.* A scenario may ask for a model that is wrong on purpose (`design_of`, `anchor`):
 
     engine terms neglected, other coefficients, another mass or inertia     only other numbers in the record
-    frozen alpha                f(x, y0) and G(y0) with alpha held at its trim value, all else as measured
+    frozen alpha                f(x, y) and G(y) with alpha held at its trim value, all else as measured
     linearised about trim       f = f0 + f_x (x - x0) + f_y (y - y0), G = G0
     both                        the linear model without its derivative with alpha: f_y[:, ALPHA] = 0
 

@@ -56,8 +56,8 @@ class Relation(NamedTuple):
     theta_high: float
 
 
-# Type -> function from the travel low, high (rad) to its relation. Columns of the log define types in no
-# table.
+# Type -> function from the travel low, high (rad) to its relation: gain, whether theta is a share, whether it
+# is constant, and its range. Columns of the log define types in no table.
 RELATIONS = {
     "stuck": lambda low, high: Relation(0.0, False, True, low, high),
     "float": lambda low, high: Relation(0.0, False, True, *2 * (min(max(0.0, low), high),)),
@@ -923,7 +923,7 @@ def whitened_sums(statement, frames):
     """
     dt = frames.dt
     axes = statement["axes"]
-    n = len(statement["axes"])
+    n = len(axes)
     Y, P, R = (array_with_zeros(statement[name]) for name in ("Y", "P", "R"))
     values = slice(None, n)
     drifts = slice(n, None)

@@ -81,10 +81,10 @@ class SurfaceBounds:
         if upper is None:  # an oscillation: theta is the distance from the command
             held = replace(held, offset=np.zeros_like(held.offset))
         axis = int(self.lower[lower[0]].argmax()) if axis is None else axis
-        entries = [self._bound_fields(held, lower, axis, 1)]
+        entries = [self._bound_fields(held, lower, axis, side=1)]
         if upper is not None:
             upper_axis = int(self.upper[upper].argmin())
-            entries.append(self._bound_fields(held, range(upper, upper + 1), upper_axis, -1))
+            entries.append(self._bound_fields(held, range(upper, upper + 1), upper_axis, side=-1))
         return {"theta": "course", **fields, "bounds": entries, "sides": np.array(pairs, float).T.tolist()}
 
     def _bound_fields(self, held: Hypothesis, frames: range, axis: int, side: int) -> Document:

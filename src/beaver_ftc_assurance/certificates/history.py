@@ -51,7 +51,7 @@ class History:
     and bound eta_bar on its error, rad/s2, of the frame that ends with the row.
 
     row_dt: time between two rows, s. instants: number of JSBSim frames in this time. If gyros are noisy,
-    types are tested by blocks of `length` rows (diagnosis/types/registry.py); the first block begins with row
+    types are tested by blocks of `length` rows (diagnosis/types/records.py); the first block begins with row
     `begin`. A block counts as one frame of several instants. Its bound has the noise of the gyros at its two
     ends only.
     """

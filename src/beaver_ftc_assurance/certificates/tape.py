@@ -94,7 +94,7 @@ class _RecordWords:
         for name, (dtype, shape, n) in self._what.items():
             words = np.ascontiguousarray(rows[:, first_word : first_word + n])
             quantities[name] = words.view(dtype).reshape(len(rows), *shape)
-            first_word = first_word + n
+            first_word += n
         return quantities
 
 

@@ -388,7 +388,7 @@ def note_shortfall(axes, command, layout, lag, engine_authority):
 
         shortfall = demand - G (u + lag),    rad/s2
 
-    lag (n,) rad: position less command of a slow surface; engine_authority: as in `attainable`.
+    lag (n,) rad: position of a slow surface less that of a healthy one; engine_authority: as in `attainable`.
     """
     G = axes.G
     for i in range(3):

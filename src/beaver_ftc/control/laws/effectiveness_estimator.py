@@ -1,4 +1,4 @@
-"""Effectiveness of every surface from the innovation of a disturbance observer, once no known fault fits.
+"""Effectiveness of every surface from the innovation of a disturbance observer, while an alarm names none.
 
 An observer of a rate and a slow disturbance (rejecting.py) answers an acceleration a that is not in its model
 with
@@ -33,7 +33,7 @@ from beaver_ftc.design.table import ALPHA, BETA
 
 OBSERVER_ERROR = record(rate=3, disturbance=3)  # e and dd of one acceleration
 _SIGNALS = 5  # in y: alpha, beta, p, q, r
-_FEW = 4  # Each of so few surfaces leads an axis or stands in, and evidence.py estimates one at a time.
+_FEW = 4  # So few surfaces have no estimator: evidence.py estimates those that lead an axis, one at a time.
 _THETA_STD = 0.5  # standard deviation of the theta of a surface at the start
 _A_STD = np.array([30.0, 30.0, 3.0, 3.0, 3.0])  # standard deviations of A at the start, 1/s2 and 1/s, as y
 _CORRELATED = 10.0  # This many frames of the innovation count as one, because it is no white noise.

@@ -19,8 +19,9 @@ taken at that instant too.
 Gains. A loop has Kp = s and w_o = RATIO s; loop_design.py derives s, 1/s, from what is declared.
 
 Effectiveness of a surface at fault. The law takes the diagnosis' estimate, or that from the observer's
-innovation if it is larger (evidence.py), and withdraws a surface that stays at its stop (withdrawal.py). Once
-no known fault fits, the law estimates all surfaces at once (effectiveness_estimator.py).
+innovation if it is larger (evidence.py), and withdraws a surface that stays at its stop (withdrawal.py). If
+the aircraft has many surfaces, the law estimates all of them at once while an alarm names none
+(effectiveness_estimator.py).
 """
 
 from math import exp, sqrt
@@ -175,7 +176,7 @@ def accommodate(control, assessment, faults, prediction, measured):
     """Bring the effectiveness of all surfaces to this frame (control.CompiledLaw). A law that is informed
     takes the truth. Otherwise the target of a surface is
 
-        no known fault fits, and the estimator is active    its estimate
+        the diagnosis names none, the estimator is active   its estimate
         a loss of a main surface that no other replaces     the larger of the diagnosis' and the observer's
                                                             (`larger_estimate`)
         otherwise                                           the diagnosis' estimate

@@ -79,7 +79,7 @@ def failed(plan: EvidencePlan, case: tuple[str, int], why: str, status: str = CR
     source = plan.sources[name]
     none = part("flight", None, None, NOT_SHOWN, says=why)
     assigned = source.assignment(run)
-    of_sweep = assigned and row_of_failure(source.what, assigned, status, why)  # type: ignore[arg-type]
+    of_sweep = assigned and row_of_failure(source.content, assigned, status, why)  # type: ignore[arg-type]
     return {
         "flight": source.flight(run), "source": name, "run": run, "status": status, "why": why,
         "found": {requirement.id: [none] for requirement in plan.of(name)}, "row": of_sweep,
@@ -96,18 +96,18 @@ def _flown(plan: EvidencePlan, name: str, run: int) -> Row:
     formulas = [plan.formulas.get(requirement.id) for requirement in plan.of(name)]
     log = Watched(column for formula in formulas if formula for column in formula.columns)
     flight = fly(scenario, log)
-    amounts = measure(flight)
+    metrics = measure(flight)
     assigned = source.assignment(run)
-    lost = amounts.departure
+    departure = metrics.departure
     return {
         "flight": source.flight(run), "source": name, "run": run,
-        "status": DEPARTED if lost else FLOWN,
-        "why": f"lost: {lost.signal} at {lost.time_s:g} s" if lost else "",
+        "status": DEPARTED if departure else FLOWN,
+        "why": f"lost: {departure.signal} at {departure.time_s:g} s" if departure else "",
         "found": {
-            requirement.id: _judged(plan, requirement, scenario, amounts, log)
+            requirement.id: _judged(plan, requirement, scenario, metrics, log)
             for requirement in plan.of(name)
         },
-        "row": assigned and row_of(assigned, amounts, flight),
+        "row": assigned and row_of(assigned, metrics, flight),
         "scenario": hashlib.sha256(to_yaml(scenario).encode()).hexdigest(),
         "log": log.sha256,
         "aircraft": scenario.airframe.name,
@@ -126,16 +126,16 @@ def part(
 
 
 def _judged(
-    plan: EvidencePlan, requirement: Requirement, scenario: Scenario, amounts: Metrics, log: Watched
+    plan: EvidencePlan, requirement: Requirement, scenario: Scenario, metrics: Metrics, log: Watched
 ) -> list[Row]:
     """The parts of a requirement on a flight; none if the requirement is on the statistics of a sweep."""
     bar = requirement.bar
     formula = plan.formulas.get(requirement.id)
     if formula is not None:
-        return [_of_formula(requirement.formula or "", formula, scenario.rate_hz, amounts, log)]
+        return [_of_formula(requirement.formula or "", formula, scenario.rate_hz, metrics, log)]
     try:
         if isinstance(bar, OfHandling):
-            return _of_handling(bar, scenario, amounts, log)
+            return _of_handling(bar, scenario, metrics, log)
         if isinstance(bar, OfMargins):
             return _of_margins(bar, scenario)
     except BeaverFtcError as error:  # the study does not cover the flight, for example because of its law
@@ -144,11 +144,11 @@ def _judged(
         return []
     return [
         part(bound.name, bound.expected, bound.actual, MET if bound.passed else NOT_MET, margin(bound))
-        for bound in evaluate(plan.expect[requirement.id], amounts)
+        for bound in evaluate(plan.expect[requirement.id], metrics)
     ]
 
 
-def _of_formula(text: str, formula: Formula, rate_hz: float, amounts: Metrics, log: Watched) -> Row:
+def _of_formula(text: str, formula: Formula, rate_hz: float, metrics: Metrics, log: Watched) -> Row:
     """The part of a formula of signal temporal logic. r: its robustness, at least 0 if the formula holds. The
     first of these rows that applies gives the verdict:
 
@@ -158,24 +158,24 @@ def _of_formula(text: str, formula: Formula, rate_hz: float, amounts: Metrics, l
         r < 0                                                            not met
     """
     r = formula.robustness(log, rate_hz)
-    lost = amounts.departure
+    departure = metrics.departure
     if not math.isfinite(r):
         nan = "a column is not a number where it asks"
         far = "it looks beyond the log, or at what is infinite"
         why = nan if math.isnan(r) else far
         return part("robustness", text, None, NOT_SHOWN, says=why)
-    if r >= 0.0 and lost and formula.looks_ahead_s > lost.time_s:
-        return part("robustness", text, r, NOT_SHOWN, says=f"the aircraft was lost at {lost.time_s:g} s")
+    if r >= 0.0 and departure and formula.looks_ahead_s > departure.time_s:
+        return part("robustness", text, r, NOT_SHOWN, says=f"the aircraft was lost at {departure.time_s:g} s")
     return part("robustness", text, r, MET if r >= 0.0 else NOT_MET, r)
 
 
-def _of_handling(bar: OfHandling, scenario: Scenario, amounts: Metrics, log: Watched) -> list[Row]:
+def _of_handling(bar: OfHandling, scenario: Scenario, metrics: Metrics, log: Watched) -> list[Row]:
     """A part for each limit on a mode of motion: whether its level of handling qualities is good enough; one
     part, not shown, if the aircraft was lost."""
     from beaver_ftc.studies import HANDLING_LIMITS as LIMITS
     from beaver_ftc.studies import where_ended, where_trimmed
 
-    if amounts.departure:
+    if metrics.departure:
         return [part("handling qualities", bar.level, None, NOT_SHOWN, says="the aircraft was lost")]
     qualities = where_ended(scenario, log.end) if scenario.faults else where_trimmed(scenario)
     parts = []

@@ -148,7 +148,7 @@ def _of_sweep(plan: EvidencePlan, bar: OfSweep, name: str, rows: Sequence[Row]) 
     from beaver_ftc.studies.sweep import schema_of, table_of, write_tables
 
     source = plan.sources[name]
-    sweep = source.what
+    sweep = source.content
     assert isinstance(sweep, Sweep)
     schema = schema_of(sweep)
     table = table_of(sweep, schema, [row["row"] for row in rows if row["source"] == name])

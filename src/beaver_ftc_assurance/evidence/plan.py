@@ -122,7 +122,7 @@ class _Reading:
             if formula:
                 formulas[requirement.id] = formula
             for k, source in enumerate(sources):
-                if isinstance(requirement.bar, OfSweep) and not isinstance(source.what, Sweep):
+                if isinstance(requirement.bar, OfSweep) and not isinstance(source.content, Sweep):
                     text = f"{source.given} is a scenario, allowed with a bar of type sweep: sweeps"
                     self._problem((*place, "over", k), text)
                 if formula:

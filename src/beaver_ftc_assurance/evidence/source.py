@@ -19,42 +19,42 @@ from beaver_ftc.studies.sweep import Assignment, Plan, flight_name, scenario_of
 
 @dataclass(frozen=True)
 class Source:
-    """A scenario or a sweep (`what`) that a plan flies. given: its name or path in the plan."""
+    """A scenario or a sweep (`content`) that a plan flies. given: its name or path in the plan."""
 
     name: str
     given: str
-    what: Scenario | Sweep
+    content: Scenario | Sweep
 
     @property
     def flights(self) -> int:
         """Number of its flights."""
-        return self.what.flights if isinstance(self.what, Sweep) else 1
+        return self.content.flights if isinstance(self.content, Sweep) else 1
 
     @property
     def aircraft(self) -> Aircraft:
         """The aircraft of all its flights."""
-        return self.what.aircraft if isinstance(self.what, Sweep) else self.what.airframe
+        return self.content.aircraft if isinstance(self.content, Sweep) else self.content.airframe
 
     def assignment(self, run: int) -> Assignment | None:
         """The varied values of one flight of a sweep; None for a scenario."""
-        return Plan(self.what).assignments([run])[0] if isinstance(self.what, Sweep) else None
+        return Plan(self.content).assignments([run])[0] if isinstance(self.content, Sweep) else None
 
     def flight(self, run: int) -> str:
         """The name of one flight."""
-        return flight_name(self.what, run) if isinstance(self.what, Sweep) else self.name
+        return flight_name(self.content, run) if isinstance(self.content, Sweep) else self.name
 
     def scenario(self, run: int) -> Scenario:
         """The scenario of one flight. Raises BadInput if the varied values contradict each other."""
-        if not isinstance(self.what, Sweep):
-            return self.what
+        if not isinstance(self.content, Sweep):
+            return self.content
         assigned = self.assignment(run)
         assert assigned is not None
-        return scenario_of(self.what, assigned)
+        return scenario_of(self.content, assigned)
 
     @property
     def base(self) -> Scenario:
         """The scenario of all its flights, without the variations."""
-        return self.what.scenario({}) if isinstance(self.what, Sweep) else self.what
+        return self.content.scenario({}) if isinstance(self.content, Sweep) else self.content
 
     @cached_property
     def columns(self) -> tuple[str, ...]:
@@ -73,9 +73,9 @@ class Source:
         its aircraft."""
         aircraft = digest_of_aircraft(self.aircraft.folder)
         left_out = {"description", "expect"}
-        if isinstance(self.what, Sweep):
-            file = self.what.file.model_dump(mode="json", exclude=left_out | {"base", "set"})
-            text = repr([aircraft, self.what.base, file])
+        if isinstance(self.content, Sweep):
+            file = self.content.file.model_dump(mode="json", exclude=left_out | {"base", "set"})
+            text = repr([aircraft, self.content.base, file])
         else:
-            text = repr([aircraft, self.what.model_dump(mode="json", exclude=left_out)])
+            text = repr([aircraft, self.content.model_dump(mode="json", exclude=left_out)])
         return hashlib.sha256(text.encode()).hexdigest()

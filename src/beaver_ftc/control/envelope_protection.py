@@ -207,7 +207,8 @@ def record_limit(holding, kind, value, in_force, t):
 
 def set_up_level_flight_table(holding: np.void, layout: np.void, declared: Declared) -> None:
     """Fill the table of level flight, if the aircraft's file has forces, the signal THRUST, and a stand-in
-    for the elevator; the dynamic pressures are those of the envelope's airspeeds at sea level."""
+    for the elevator; has_table, only if there is level flight at each point. The dynamic pressures are those
+    of the envelope's airspeeds at sea level."""
     aircraft, flap = declared.aircraft, int(layout["stand_in"])
     fill(holding, from_s=-1.0, bank=radians(MOST_BANK_DEG), fastest=np.inf)
     if flap < 0 or not aircraft.forces or THRUST not in aircraft.signals:

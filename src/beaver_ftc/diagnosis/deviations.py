@@ -32,7 +32,8 @@ _GYRO_OF = dict(zip(RATE_SIGNALS, AXES, strict=True))
 
 def plugin_errors(declared: Declared, model: np.ndarray, y: np.ndarray, u: np.ndarray) -> "DeclaredErrors":
     """Return the declared errors for a plug-in, at the trim y (4 + signals,) and u (surfaces,) rad; model:
-    record of the design model, (1,). The variance of a reading is noise^2 + bias^2 + resolution^2 / 12.
+    record of the design model, (1,). For `model_rad_s2` alone, the variance of a reading is
+    noise^2 + bias^2 + resolution^2 / 12.
     """
     from beaver_ftc.design.context import DeclaredErrors  # for plug-ins alone
 
@@ -70,7 +71,7 @@ def air_rotation_slopes(model: DesignFunctions, y: np.ndarray) -> np.ndarray:
 def model_error_std(
     model: np.ndarray, y: np.ndarray, u: np.ndarray, sigma: np.ndarray, dC: np.ndarray, du: np.ndarray
 ) -> np.ndarray:
-    """Standard deviation (3,) rad/s2 of a = f + G u at y and u, all errors e independent:
+    """Standard deviation (3,) rad/s2 of a = f + G u at rest (x = 0), y and u, all errors e independent:
 
         sqrt(sum over e of (a(e) - a(0))^2)
 
@@ -78,9 +79,9 @@ def model_error_std(
     du (surfaces,) rad: of the deflections.
     """
 
-    def a(model: np.ndarray, y: np.ndarray, u: np.ndarray) -> np.ndarray:
+    def a(record: np.ndarray, reading: np.ndarray, deflection: np.ndarray) -> np.ndarray:
         """f + G u (3,) rad/s2 at rest, by the record of a model, (1,)."""
-        return acceleration_at(model[0], np.zeros((1, 3)), y[None], u[None])[0]
+        return acceleration_at(record[0], np.zeros((1, 3)), reading[None], deflection[None])[0]
 
     a_e = [a(model, y + dy, u) for dy in np.diag(np.pad(sigma, (0, y.size - sigma.size)))]
     a_e += [a(model, y, u + du_s) for du_s in np.diag(du)]
@@ -97,7 +98,8 @@ def flow_noise(errors: SensorErrors, V: float) -> np.ndarray:
 
         hypot(sigma_vane, sigma_attitude) + angle (sigma_V / V + sigma_phi)
 
-    An error of pitch attitude or heading turns the flow as much as an error of a vane. V: airspeed, m/s.
+    An error of pitch attitude or heading turns the flow as much as an error of a vane. V: airspeed, m/s;
+    angle: 0.3 rad.
     """
     angle = 0.3  # rad: attitudes and incidences of up to 17 deg
     pairs = (("alpha", "theta"), ("beta", "psi"))
@@ -125,8 +127,9 @@ def moment_axis(term: Term) -> int:
 
 
 def coefficient_bounds(declared: Declared, model: np.void, y: np.ndarray, u: np.ndarray) -> np.ndarray:
-    """Tolerance (terms,) of the coefficient of each term of the moments. It covers every declared constant
-    error but those of the air data, which have columns of their own (rows.py); y, u in trim:
+    """Tolerance (terms,) of the coefficient of each term of the moments. It covers the
+    constant errors of coefficients, inertia and gyros, and the slope errors of the air data, whose constant
+    offsets have columns of their own (rows.py); y, u in trim:
 
         dC + (e_inertia + e_signals) |C| + [constant term] sum_j |d(Cl, Cm, Cn) / d(ph, qh, rh)_j| e_j
 

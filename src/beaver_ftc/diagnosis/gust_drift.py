@@ -3,13 +3,14 @@
 The rotation w_j of the air about each axis j of the gusts is a first-order process of lag tau_j. Its
 unmeasured share acts on the rates like a drift of the model's acceleration, of the intensity
 
-    V sum_j (L C)_ij (L C)_kj share_j Q_j        on the body axes i and k, (rad/s2)2/s
+    V_max sum_j (L C)_ij (L C)_kj share_j Q_j        on the body axes i and k, (rad/s2)2/s
 
+V_max, m/s, is the larger of the airspeed and the estimated speed V of gusts.py.
 If the axes of the gusts turn fast, the unmeasured gust changes with them in body axes, faster than this
 drift. The variance of that change is added to the drift in the frames of the turn: `var_turn`, which
 `whitening.add_turn_to_drift` reads.
 
-Letters as in gusts.py, which computes the estimate; i_1 and i_2 are body axes, too.
+Letters as in gusts.py, which computes the estimate.
 """
 
 from math import pi
@@ -42,13 +43,13 @@ def gust_lag(gust, j, V):
 
 
 @kernel
-def effect_product(gust, C, i_1, i_2, j):
-    """Product of the effects of the gust about axis j on two accelerations, (L C)_i1j (L C)_i2j.
+def effect_product(gust, C, i, k, j):
+    """Product of the effects of the gust about axis j on two accelerations, (L C)_ij (L C)_kj.
 
     C (3, 3): rotation from the axes of the gusts, for a product in 1/s2; or C_dot, for one in 1/s4.
     """
     L = gust.output.rate_damping
-    return project_gust(L[i_1], C, j) * project_gust(L[i_2], C, j)
+    return project_gust(L[i], C, j) * project_gust(L[k], C, j)
 
 
 @kernel
@@ -59,7 +60,7 @@ def unmeasured_share(gust, j):
 
     share_j: what vanes leave in any case. The second term is by the error of V, if the gust is measured.
     passing: of the pitching gust start_share, of the yawing gust turn_past. The rolling gust has only the
-    first term. V is at least 1 m/s, because it divides.
+    first term. V is `gust.output.V`, at least 1 m/s, because it divides.
     """
     cfg = gust.config
     mem = gust.memory
@@ -72,14 +73,16 @@ def unmeasured_share(gust, j):
 
 
 @kernel
-def unmeasured_drift(gust, V, i_1, i_2, as_rolling=False):
-    """Intensity, (rad/s2)2/s, of the drift of accelerations i_1 and i_2 by the unmeasured rotation; V m/s.
+def unmeasured_drift(gust, V, i, k, as_rolling=False):
+    """Intensity, (rad/s2)2/s, of the drift of accelerations i and k by the unmeasured rotation; V m/s:
+    airspeed.
 
-        V sum_j (L C)_i1j (L C)_i2j share_j Q_j
+        max(V, gust.output.V) sum_j (L C)_ij (L C)_kj share_j Q_j
 
-    as_rolling: of a gust with the correlation length of the rolling gust and equal power at low frequency, if
-    no gust is measured: then Q_j is scaled by (tau_j V / L_roll)^2. What vanes leave of a measured gust has
-    an unknown spectrum, so its intensity stays.
+    as_rolling: if the gust is declared to be visible only coarsely (`coarse_only`), of a gust with the
+    correlation length of the rolling gust and equal power at low frequency: Q_j is scaled by (tau_j V /
+    L_roll)^2. What vanes leave of a gust has an unknown spectrum, so otherwise its intensity stays, even
+    after `drop_accelerometers`.
     """
     cfg = gust.config
     C = gust.output.C
@@ -87,7 +90,7 @@ def unmeasured_drift(gust, V, i_1, i_2, as_rolling=False):
     for j in range(3):
         Q = unmeasured_share(gust, j) * gust.memory.Q[j]
         scale = (gust_lag(gust, j, 1.0) / cfg.L_roll) ** 2 if as_rolling and cfg.coarse_only else 1.0
-        Q_V += effect_product(gust, C, i_1, i_2, j) * Q * scale
+        Q_V += effect_product(gust, C, i, k, j) * Q * scale
     return Q_V * max(V, gust.output.V)
 
 
@@ -95,12 +98,13 @@ def unmeasured_drift(gust, V, i_1, i_2, as_rolling=False):
 def view_drift(gust, V, L_rate, L_force, subtracted):
     """Intensity, (rad/s2)2/s, of the drift of a view by the rotation of the air:
 
-        V sum_j (sqrt(share_j) |L_rate' C_j| + |L_force' C_j|)^2 Q_j
+        max(V, gust.output.V) sum_j (sqrt(share_j) |L_rate' C_j| + |L_force' C_j|)^2 Q_j
 
+    V m/s: airspeed.
     L_rate, L_force (3,) 1/s: sensitivity of the view's rates and of its forces to rotation about the body
     axes. subtracted: the gust estimate is subtracted from the rates, so that only a share of the gust acts on
-    them. Otherwise share is 1, and each j adds (tau L_rate' C_dot_j)^2 Q_j / 2 if C turns fast. The forces
-    always contain the whole gust.
+    them. Otherwise share is 1, and each j adds (tau L_rate' C_dot_j)^2 Q_j / 2 if C turns fast, with tau of
+    the rolling gust, as in `gusts.fill_axes_rate`. The forces always contain the whole gust.
     """
     C = gust.output.C
     mem = gust.memory
@@ -115,7 +119,7 @@ def view_drift(gust, V, L_rate, L_force, subtracted):
 
 @kernel
 def add_turn_variance(gust, V, dt):
-    """Add to var_now the effect of the turn of the gusts' axes in dt s; V m/s.
+    """Add to var_now the effect of the turn of the gusts' axes in dt s, if they turn fast; V m/s: airspeed.
 
         dt V sum_j (L C_dot)_ij (L C_dot)_kj tau_j^2 Q_j share_j / 2      j: roll, yaw
 
@@ -151,7 +155,7 @@ def finish_turn_variance(gust):
     if mem.n_turn > 0:
         mem.n_turn -= 1
         for i in range(3):
-            for j in range(3):
-                out.var_turn[i, j] = mem.var_prev[i, j] + mem.var_now[i, j]
+            for k in range(3):
+                out.var_turn[i, k] = mem.var_prev[i, k] + mem.var_now[i, k]
         mem.var_prev[:] = mem.var_now
         mem.var_now[:] = 0.0

@@ -26,7 +26,7 @@ leaves at most e^2 / 4 of the gust's intensity unmeasured (`gusts_design.speed_e
 The intensity of turbulence is that above 2000 ft, or that at the height flown if it is larger.
 
 The velocity is integrated as in JSBSim, by the two-step method of Adams and Bashforth:
-v' = v + dt (3 a - a_prev) / 2.
+v <- v + dt (3 a - a_prev) / 2.
 
 gust_drift.py has the drift by the part of a gust that stays unmeasured. gusts_design.py fills the record from
 what a scenario declares.
@@ -103,7 +103,8 @@ GUST_MEMORY_RECORD = record(
 
 GUST_OUTPUT_RECORD = record(
     # Whether turbulence is declared; whether accelerometers are used; whether the gust is measured. The
-    # configuration fills these, and `drop_accelerometers` may clear the last two.
+    # configuration fills these. `drop_accelerometers` may clear the last two, and `forces.drop_forces` clears
+    # the first of the estimates of the views.
     gusty=int, uses_accelerometers=int, measured=int,
     acc=3, acc_mean=3, acc_coarse=3,  # by the measured gust: now, and mean over the frame; by a coarse one
     var_turn=(3, 3), V=float,  # var_turn: var_now plus var_prev
@@ -142,7 +143,7 @@ def fill_velocity(gust, y, attitude):
     """Fill T, the heading, and v = T' V (cos(alpha) cos(beta), sin(beta), sin(alpha) cos(beta)) of this
     instant, in level axes.
 
-    y (5,) and attitude (3,) rad as measured; V m/s: airspeed.
+    y (4 + signals,) and attitude (3,) rad as measured; V m/s: airspeed.
     """
     mem = gust.memory
     V = y[AIRSPEED]
@@ -192,7 +193,8 @@ def fill_axes_rate(gust, dt, V):
     """Fill `C_dot`, 1/s, from the C of the instant before, dt s ago, and whether the axes turn fast.
 
     A constant unmeasured gust of deviation sigma = sqrt(Q tau / 2) then changes in body axes at the rate
-    sigma C_dot. Over its lag tau this equals a random walk of (C_dot tau)^2 / 2 times its intensity.
+    sigma C_dot. Over its lag tau this equals a random walk of (C_dot tau)^2 / 2 times its intensity. The turn
+    is fast if that exceeds FAST_TURN_SHARE for the largest C_dot and the tau of the rolling gust.
     """
     C = gust.output.C
     C_dot = gust.memory.C_dot
@@ -208,11 +210,12 @@ def fill_axes_rate(gust, dt, V):
 def advance_gust(gust, y, attitude, dt):
     """Update w (3,) rad/s for the elapsed dt s; the rolling gust stays unknown.
 
-        v_still = v + dt (3 a - a_prev) / 2,  a = T' f + gravity,  in the level axes of now
+        v_still = v + dt (3 a - a_prev) / 2,  a = T' f + gravity,  turned to the level axes of now
         dv = v_still - v,  v as measured now: change of the gust
 
-    y (5,) and attitude (3,) rad as measured now. The order matters: f and T in memory are still those of dt s
-    ago, until `fill_velocity` replaces T and v; f is replaced later, by `fill_gust_effect`.
+    At the first update a_prev is a. y (4 + signals,) and attitude (3,) rad as measured now. The order
+    matters: f and T in memory are still those of dt s ago, until `fill_velocity` replaces T and v; f is
+    replaced later, by `fill_gust_effect`.
     """
     mem = gust.memory
     v = mem.v
@@ -238,9 +241,11 @@ def advance_gust(gust, y, attitude, dt):
 def update_rotation(gust, dv, psi_dot, dt):
     """Let the pitching and yawing rotation of the air decay, and add what the change of the gust shows of it.
 
-        w_q <- exp(-dt / tau_q) w_q + dv_z / V tau_q      w_r <- exp(-dt / tau_r) w_r + dv_y / V tau_r
+        w_q <- a_q w_q + dv_z / V tau_q      w_r <- a_r w_r + dv_y / V tau_r
+        start_share <- a_q start_share
 
-    dv (3,) m/s: change of the gust in level axes; psi_dot rad/s: rate of the heading; dt s.
+    a_q = exp(-dt / tau_q), a_r = exp(-dt / tau_r); dv (3,) m/s: change of the gust in level axes; psi_dot
+    rad/s: rate of the heading; dt s.
 
     The gusts turn with the aircraft: a gust from ahead, of deviation sigma, becomes one from the side, at the
     rate psi_dot sigma. The gust itself is a walk of intensity 3 sigma^2 V / L. The square of that rate over
@@ -250,8 +255,8 @@ def update_rotation(gust, dv, psi_dot, dt):
         share = psi_dot^2 b L / (pi V^2)        turn_past <- min(max(a_r turn_past, larger), 1)
 
     larger: the larger share of this instant and of the one before, because JSBSim's gusts turn a step after
-    the heading. If it reaches 1, as when the nose passes the vertical, the vanes mostly measure the turn: the
-    yawing gust then only decays, and the sum of changes v_g starts again.
+    the heading. If `larger` reaches 1, as when the nose passes the vertical, the vanes mostly measure the
+    turn: the yawing gust then only decays, and the sum of changes v_g starts again, with start_left 1.
     """
     cfg = gust.config
     mem = gust.memory
@@ -275,9 +280,10 @@ def update_rotation(gust, dv, psi_dot, dt):
 def update_gust_speed(gust, dv, V, dt):
     """Update v_g and V for the elapsed dt s.
 
-        v_g <- a v_g + dv      V = |v + v_g|
+        v_g <- clip(a v_g + dv, -v_max, v_max)      gust.output.V = max(|v + v_g|, V / 2)
+        start_left <- a^2 start_left                a = exp(-a_v dt)
 
-    dv (3,) m/s: change of the gust in level axes. V m/s: airspeed; it is the speed if no gust is measured.
+    dv (3,) m/s: change of the gust in level axes. V m/s: airspeed, which is the speed if no gust is measured.
     """
     mem, cfg = gust.memory, gust.config
     gust.output.V = V
@@ -316,9 +322,9 @@ def step_gust(gust, y, attitude, dt, k):
 @kernel
 def fill_gust_effect(gust, design, x, y, u):
     """Fill acc (3,) rad/s2, the effect -L C w of the measured gust from now on, or acc_coarse, that of a gust
-    known coarsely; the other is 0. Also fill f for the next instant.
+    known coarsely; the other is 0. Without any estimate both are 0. Also fill L, and f for the next instant.
 
-    x (3,) rad/s and y (5,) as measured; u (n,) rad: positions of healthy surfaces.
+    x (3,) rad/s and y (4 + signals,) as measured; u (n,) rad: positions of healthy surfaces.
     """
     mem, out = gust.memory, gust.output
     fill_specific_force(gust, x, y, u)

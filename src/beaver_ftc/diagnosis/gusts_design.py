@@ -41,7 +41,7 @@ def configure_gust(gust: np.void, declared: Declared) -> None:
     fill(
         gust["config"], has_forces=known, coarse_only=air.moves and not measured, span=span, Q_aloft=aloft,
         S_m=aircraft.geometry.wing_area_m2 / declared.mass.mass_kg, Q_1m=air.rotation_walk_at_1_m(span),
-        gravity=GRAVITY_MPS2,  # standard; what is constant has no part in a change of the gust
+        gravity=GRAVITY_MPS2,  # standard; `configure_gust_speed` bounds its change with place
         h0=altitude.worst, h1=altitude.slope, L_gust=SCALE_M, L_roll=rotation_lengths(span)[0],
     )  # fmt: skip
 
@@ -51,8 +51,8 @@ def add_gust_noise(
 ) -> None:
     """Add the noise of the gust estimate to the model noise of the detector.
 
-    It is the noise of the flow angles from the vanes, rad, and of the accelerometers that predict the
-    velocity, integrated over a frame of dt s. The estimate without vanes, `gust_noise` of the forces, has the
+    It is the noise of the flow angles from the vanes, rad, and, if accelerometers predict the velocity, of
+    these, integrated over a frame of dt s. The estimate without vanes, `gust_noise` of the forces, has the
     noise of the accelerometers over the effect of the flow angle. y, u: in trim.
     """
     std = flow_noise(errors, y[AIRSPEED])
@@ -70,7 +70,8 @@ def add_gust_noise(
 
 
 def configure_gust_speed(gust: np.void, declared: Declared, level: float, V: float) -> None:
-    """Fill the decay rate a of the gust velocity, and the error variance of the speed; V m/s: in trim.
+    """If a gust is measured, fill the decay rate a of its velocity, its limit MAX_GUST_STDS sigma, and the
+    error variance of the speed; V m/s: in trim.
 
         a^3 = 2 b^2 V / (L sigma^2)      var_V = sigma^2 a / (a + V / L) + (b / a)^2 + noise^2 + e_V^2
 
@@ -106,9 +107,9 @@ def configure_gust_speed(gust: np.void, declared: Declared, level: float, V: flo
 def speed_error_share(level: float) -> float:
     """Share of a gust's intensity that a relative error e of the speed leaves, over the variance of e.
 
-    The error adds (e / tau) q to the gust's equation. Its spectrum is e^2 (w / tau)^2 / (w^2 + 1 / tau^2)^2
-    times that of a random walk of the gust's intensity: e^2 / 4 at most. e is normal and independent of the
-    noise. The product of two normal numbers exceeds x deviations with a probability of exp(-x). This equals
-    that of the alarm level, exp(-level^2 / 2), if e is taken to be level / 2 deviations.
+    The error adds (e / tau) q to the gust's equation. At the frequency w its spectrum is e^2 (w / tau)^2 /
+    (w^2 + 1 / tau^2)^2 times that of a random walk of the gust's intensity: e^2 / 4 at most. e is normal and
+    independent of the noise. The product of two normal numbers exceeds x deviations with a probability of
+    exp(-x). This equals that of the alarm level, exp(-level^2 / 2), if e is taken to be level / 2 deviations.
     """
     return (0.5 * level) ** 2 / 4.0

@@ -16,7 +16,7 @@ NO_THETA = (1.0, -1.0)  # an empty set, too, but with ends to which an estimate 
 def explain(nu, e, Z, lo, hi):
     """The theta of [lo, hi] with |nu - theta Z| <= e:
 
-        [lo, hi] n [(nu -+ e) / Z]      Z = 0: [lo, hi] if |nu| <= e, else none
+        [lo, hi] and [(nu -+ e) / Z] intersected      Z = 0: [lo, hi] if |nu| <= e, else NO_THETA
 
     nu, e rad/s2, or rad/s of a filtered residual; Z the same per unit of theta. lo > hi in the result: none.
     """

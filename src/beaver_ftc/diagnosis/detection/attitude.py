@@ -18,19 +18,22 @@ what was before the fault only adds noise:
     z <- a z + g / sqrt S          N <- b N + g_s g / S      M <- b M + g_s^2 / S
 
 Unknown constants c_j, |c_j| <= tol_j, multiply known accelerations r_j: the errors of coefficients, and for
-each axis by itself the bounded uncertainty and errors of the damping. Through the same filter they add
-c_j z_j and c_j R_j to the sums. Without a fault of a surface
+each axis by itself a share of the bounded uncertainty, taken as constant, and errors of the damping. Through
+the same filter they add c_j z_j and c_j R_j to the sums. Without a fault of a surface
 
     (|z| - sum_j tol_j |z_j|) sqrt(1 - a^2)          (|N| - sum_j tol_j |R_j|) / sqrt M
 
-are at most standard normal. If one exceeds the margin of isolation, no gyro is the cause.
+are at most standard normal. If one exceeds level = sqrt(2 margin), with the margin of isolation, no gyro is
+the cause.
 
-A gyro is broken if the rates raise an alarm and the attitude shows no turn for it: if
+A gyro is broken if the rates raise an alarm (loop/frame.py asks for it) and the attitude shows no turn for
+it: if
 
     T <- a T + dA      E <- a E + dt e_T      (|T| - E) / std(T)
 
-exceeds the same margin about one axis, and no sum above does. dA, rad, is the turn of a frame beyond that of
-the gyro; e_T, rad/s, bounds what the constant errors of gyros and attitude turn.
+exceeds `level` about one axis, no sum above does, and the turns about the other axes are small (`find_gyro`).
+dA, rad, is the turn of a frame beyond that of the gyro; e_T, rad/s, bounds what the constant errors of gyros
+and attitude turn.
 
 A loss acts on roll and yaw together, so an axis i has a `row` in a block of the rates: pitch is row 0 of its
 block, roll is row 0 and yaw row 1 of theirs.

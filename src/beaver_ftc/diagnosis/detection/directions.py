@@ -27,11 +27,13 @@ def along(v, m, i, size):
 
 @kernel
 def set_directions(isolation, G):
-    """Fix, once, the direction m = (G_r, 0, -G_p) / |.| along which each fault has no effect at this G.
+    """Fix, once, the direction m = (G_r, 0, -G_p) / |.| along which the fault of each estimator has no effect
+    at this G. m stays 0, and its test then excludes nothing, if the surface moves neither roll nor yaw.
 
-    G (3, n) rad/s2 per rad: at the start of the flight. m has unit length, in the roll-yaw plane, whose two
-    axes are the only ones that one surface moves together. The bound is exact for any fixed direction; this
-    one has power while G keeps its direction, which in the Beaver depends on alpha alone, and weakly.
+    G (3, n) rad/s2 per rad: at the start of the flight; p: roll; r: yaw. m has unit length, in the roll-yaw
+    plane, whose two axes are the only ones that one surface moves together. The bound is exact for any fixed
+    direction; this one has power while G keeps its direction, which in the Beaver depends on alpha alone, and
+    weakly.
     """
     for fie in isolation.estimator[: isolation.config.n_estimators]:
         Gp, Gr = G[0, fie.surface], G[2, fie.surface]

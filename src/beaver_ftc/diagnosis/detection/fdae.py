@@ -3,16 +3,16 @@
     xhat0' = -Lambda0 (xhat0 - x) + f + G u + fhat,  eps0 = x - xhat0,  alarm when |eps0_i| > mu_i, some i
 
 [Zhang2005, sec. IV]. Until the alarm eps0 is filter 0 of the bank, which raises it. In discrete time
-xhat0[k+1] = x[k] + dt F[k] + exp(-Lambda0 dt) (xhat0[k] - x[k]).
+xhat0[k+1] = x[k] + dt (F[k] + fhat[k]) + exp(-Lambda0 dt) (xhat0[k] - x[k]).
 
 Its network approximates the fault by Gaussian radial basis functions of alpha and of beta, linear in its
 weights:
 
-    fhat_i = W_i^T Phi(alpha, beta)       W_i' = P{gain Phi D[eps_i] - leak W_i},   |Phi| = 1
+    fhat_i = W_i^T Phi(alpha, beta)       W_i' = P{gain Phi D[eps_i] [- leak W_i]},   |Phi| = 1
 
 [Zhang2005, sec. IV and V]. Phi is normalised, so that `gain` alone sets the bandwidth of learning at any
-state. D is a continuous dead zone at the detection threshold: the network cannot learn what the declared
-uncertainty explains.
+state. The leak acts once another estimate explains the fault. D is a continuous dead zone at the detection
+threshold: the network cannot learn what the declared uncertainty explains.
 
 Symbols of the kernels, in addition to those of filters.py: net is a record of FDAE_NETWORK_RECORD; M the
 memory of the FDAE; j a basis function.
@@ -149,12 +149,14 @@ def fdae_residual(fdae, x):
 
 @kernel
 def advance_fdae(fdae, bank, bound, x, F, detected, leaks, dt):
-    """Advance the FDAE by a frame; after detection, the network learns what exceeds mu.
+    """Advance the FDAE by a frame; after detection, the network first learns what exceeds mu, from residual,
+    mu and basis of the frame before.
 
         xhat <- x + dt (F + fhat) + a (xhat - x)      m <- a m + (1 - a) n_old
 
-    F (3,) rad/s2: with the isolated fault once there is one. mu: that of filter 0 of the bank, which is at
-    this frame. An error of a gyro adds at most m + n to a residual.
+    x (3,) rad/s: at the start of the frame; F (3,) rad/s2: with the isolated fault once there is one. The new
+    mu is that of filter 0 of the bank, which is at this frame. An error of a gyro adds at most m + n to a
+    residual.
     """
     M = fdae.memory
     mu = fdae.output.threshold

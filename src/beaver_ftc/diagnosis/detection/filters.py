@@ -26,8 +26,8 @@ Symbols of the kernels:
     E, T rad/s                residual of a filter and its threshold
     e rad/s                   the part of T that has a memory, T_eta + T_n
     n rad/s                   bound on the changing part of a gyro's error (`bounds.n_gyro`)
-    a, m, i                   decay per frame; number of a filter; axis
-    fie; h, Z, r rad/s2       isolation estimator; its fault h + theta Z +- r (EFFECT_RECORD of isolation.py)
+    a, m, i                   decay per frame; number of a filter; axis, or 3: along the parity direction
+    fie; h, Z, r rad/s2       isolation estimator; its fault h + theta Z +- r (EFFECT_RECORD of estimators.py)
     lo, hi                    ends of an interval: of theta, of a residual, of the acceleration by a fault
     bank, bound               records: BANK_RECORD, `bound_dtype`
 """
@@ -71,8 +71,8 @@ def residual_interval(lo, hi, R_pos, R_neg, Om, th, B):
         lo R_pos + hi R_neg - Om th - B  <=  eps  <=  hi R_pos + lo R_neg - Om th + B
 
     The parameter may move anywhere within [lo, hi] at every instant, so an incipient or intermittent fault is
-    covered. R_pos, R_neg, Om rad/s: filtered positive part, negative part and whole of Z; th: estimate;
-    B rad/s: bound on the filtered uncertainty.
+    covered. R_pos, R_neg, Om rad/s: filtered positive part, negative part (at most 0) and whole of Z; th:
+    estimate; B rad/s: bound on the filtered uncertainty.
     """
     eps_lo = lo * R_pos + hi * R_neg - Om * th - B
     eps_hi = hi * R_pos + lo * R_neg - Om * th + B
@@ -122,8 +122,8 @@ def _pole_for_delay(tau: float, n_bar: float, b: float) -> float:
 
 
 def filter_poles(config: FdiConfig, declared: Declared) -> tuple[float, ...]:
-    """The filters' poles, 1/s: the published one, those of the scenario, then those that noise requires, as
-    far as the MAX_POLES allow.
+    """The filters' poles, 1/s: the published one and, with `sharpen.pole_bank`, those of the scenario, then
+    those that noise requires, as far as the MAX_POLES allow.
     """
     for_noise = poles_for_delays(declared.sensors, max(declared.constant_rad_s2))
     others = (*config.pole_bank_per_s, *for_noise) if config.sharpen.pole_bank else ()
@@ -144,7 +144,7 @@ def update_bank(bank, bound, x, x_old, F, dt):
         nu = (x - x_old) / dt - F      nu_max = eta_bar + (n + n_old) / dt
         E <- a E + dt nu               e <- a e + dt eta_bar + (1 - a) n_old      T = e + n
 
-    e = T_eta + T_n; nu_max rad/s2: bound on nu without a fault.
+    e = T_eta + T_n; nu_max rad/s2: bound on nu without a fault, which is filled in `bound`.
     """
     nu, E, T, e = bank.output.innovation, bank.output.residual, bank.output.threshold, bank.memory.e
     for i in range(3):
@@ -177,7 +177,8 @@ def bank_axis(bank):
 @kernel
 def alarm_axis(bank, authority, alarm):
     """The axis of the alarm, or -1: that of the bank, else that of the statistical detector, as far as
-    `authority` lets each raise an alarm; alarm: ALARM_RECORD of the statistical detector."""
+    `authority` lets each raise an alarm; alarm: ALARM_RECORD of the statistical detector, whose `ratio` is
+    its largest score over the alarm level."""
     axis = bank_axis(bank) if authority != STATISTICAL_DETECTOR else -1
     if axis < 0 and authority != WORST_CASE_DETECTOR and alarm.ratio > 1.0:
         axis = alarm.axis
@@ -221,9 +222,9 @@ def fault_range(fie, i):
 
     The 0 is for the frames before the fault.
     """
-    phi, m = fie.effect, fie.parity_direction
-    h, Z = along(phi.h, m, i, False), along(phi.Z, m, i, False)
-    r = along(phi.r, m, i, True)
+    phi, d = fie.effect, fie.parity_direction
+    h, Z = along(phi.h, d, i, False), along(phi.Z, d, i, False)
+    r = along(phi.r, d, i, True)
     at_lo, at_hi = h + fie.theta_min * Z, h + fie.theta_max * Z
     return min(0.0, at_lo, at_hi) - r, max(0.0, at_lo, at_hi) + r
 
@@ -248,8 +249,8 @@ def advance_reach(bank, fie, dt):
 def is_reachable(bank, fie, shared):
     """True if L - T <= E <= U + T for each filter and each axis that the estimator does not skip.
 
-    shared: the axes share one parameter. Then the residual along the parity direction m, m' E with the
-    threshold |m|' T, must satisfy this as well.
+    shared: the axes share one parameter. Then the residual along the parity direction d, d' E with the
+    threshold |d|' T, must satisfy this as well.
     """
     for m in range(bank.config.n_filters):
         for i in range(4):

@@ -108,7 +108,7 @@ def fill_vaneless_y(forces, w, y):
 
 @kernel
 def drop_forces(forces, gust, vaneless, vaned):
-    """Stop using forces, and estimate the gust without accelerometers."""
+    """Stop using forces and the gust estimates of the views; estimate the gust without accelerometers."""
     drop_accelerometers(gust)
     vaneless.output.gusty = vaned.output.gusty = 0
     forces.in_use = 0
@@ -121,8 +121,8 @@ def update_inertial(forces, f, i, y, dt):
         angle <- angle + dt angle_rate      e_drift <- e_drift + dt slope
         returned: e - slope (vane - angle)
 
-    y (5,): readings; vane rad: that of the force's vane, from which the angle starts; slope rad/s2 per rad:
-    e of an error of the vane.
+    y (4 + signals,): readings; vane rad: that of the force's vane, at which the angle starts in the first
+    update; slope rad/s2 per rad: e of an error of the vane.
     """
     vane = y[VANES[i]]
     slope = f.vane[VANE_E] * forces.q_ratio
@@ -141,7 +141,7 @@ def fill_angle_rates(forces, g, meas):
                  + (a_z cos(alpha) - a_x sin(alpha)) / (V cos(beta))
 
     a (3,) m/s2: reading of the accelerometers plus gravity, of size g m/s2, in body axes; p, q, r rad/s:
-    rates; V m/s: airspeed; c, s: cosine and sine of alpha.
+    rates; V m/s: airspeed.
     """
     a = meas.force
     V = meas.y[AIRSPEED]

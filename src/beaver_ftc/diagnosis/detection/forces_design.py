@@ -61,10 +61,10 @@ def _configure_force(
         f_all = per_C dC / d(alpha, beta, V, p, q, r, dpt),      per_C = qdyn S / m c
         Q_e = f_vane^2 (Q_angle + walk),      Q_angle = (DRIFT_CHANGE_PER_S drift)^2 + dt (std / V)^2
 
-    f_all (7,): slopes of e, in the order of `_force_slopes`; f_vane rad/s2 per rad: that with the force's
-    vane; Q_angle rad2/s: intensity of the drift of the flow angle from inertial motion; drift rad/s: bound on
-    that drift; walk rad2/s: intensity of the change of that angle by gusts; std m/s2: noise of the
-    accelerometer.
+    f_all (7,): slopes of the predicted force, in the order of `_force_slopes`; f_vane rad/s2 per rad: that
+    with the force's vane; Q_angle rad2/s: intensity of the drift of the flow angle from inertial motion, its
+    first part by the change of the drift in 1 s; drift rad/s: bound on that drift; walk rad2/s: intensity of
+    the change of that angle by gusts; std m/s2: noise of the accelerometer.
     """
     y = trim[1]
     aircraft = declared.aircraft
@@ -94,7 +94,8 @@ def _configure_force(
 def _force_variances(
     err: np.void, errors: SensorErrors, y: np.ndarray, f_all: np.ndarray, vane: int
 ) -> tuple[float, float]:
-    """Variance of a predicted force by the noise of all readings, (rad/s2)2; the same without its vane:
+    """Variance of a predicted force by the noise of all readings, (rad/s2)2; the same without its vane. Of
+    the dynamic pressure only the part through dpt counts here: `rows.fill_force_row` adds the rest.
 
         sum_k (f_k sigma_k)^2 + f_dpt^2 var_dpt,      k: alpha, beta, V, p, q, r
 
@@ -125,7 +126,8 @@ def _drift_bound(errors: SensorErrors, gravity: float, V: float, i: int) -> floa
 
     w_E: rate of the Earth; gyros: sum of their constant errors, with the slope at TYPICAL_RATE_RAD_S; a m/s2:
     error of the acceleration across the flow. An error of the attitude turns gravity, which then has an error
-    across the flow: all of it in the sideslip, and its part by the slope of the path in the incidence.
+    across the flow: all of it in the sideslip, and its part by the slope of the path in the incidence. The
+    normal accelerometer reads about one g, so its slope counts, too.
     """
     attitude = errors["phi"].steady + errors["theta"].steady
     gyros = sum(errors[name].steady + TYPICAL_RATE_RAD_S * errors[name].slope for name in AXES)

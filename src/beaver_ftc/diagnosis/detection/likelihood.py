@@ -167,7 +167,8 @@ def block_dtype(size: BlockCapacity) -> np.dtype:
 def new_filter_block(P: np.ndarray, R: np.ndarray) -> np.ndarray:
     """A block (1,) that filters n rates and has no hypotheses.
 
-    P (2 n, 2 n): covariance of rates and their drift; R (n,): variance of a reading's noise.
+    P (2 n, 2 n): covariance of rates and their drift; R (n,): variance of a reading's noise. The decay a of
+    the drift is left 0, for the caller to fill.
     """
     blocks = np.zeros(1, block_dtype(BlockCapacity(1, 1)))
     n = len(R)
@@ -236,7 +237,7 @@ def update_signatures(h, t, first):
     """Fill s (2,) rad/s2 of hypothesis h for each of its onsets, which are the tests first, first + 1, ... of
     group t.
 
-        GROWING_LOSS    s = (1 - left) signature,  left <- left exp(-kappa dt)
+        GROWING_LOSS    left <- left exp(-kappa dt), then s = (1 - left) signature
         LOSS_END        s = the signature in the frame of the onset, in which left turns from 1 to 0
         others          s = signature
     """
@@ -382,12 +383,13 @@ def evidence_ratio(z, share, N, room, D):
 
 @kernel
 def evaluate_tests(b, t, n, without_eta, mapped):
-    """Fill the score and the log-likelihood ratios of the first n tests of a group t; 0 without information.
+    """Fill the score and the log-likelihood ratios of the first n tests of a group t; without information
+    they are 0, and llr is -1.
 
         score = (N_s - e) / max(sqrt(D), room / z + share sqrt(D))
         llr = max_llr(N_s)      llr_lo, llr_hi = max_llr(N_s -+ (e + room))
 
-    N_s: sign N, or |N| without a sign; e = e_R + max(sign N_p, 0) + max(sign N_c, 0); room: of
+    N_s: sign N, or |N| if sign is 0; e = e_R + max(sign N_p, 0) + max(sign N_c, 0); room: of
     `uncertain_share`; z: alarm level; share: `noise_share`.
 
     without_eta: the bounds on the ratios leave out the room. mapped: for hypotheses that have no sign they
@@ -420,8 +422,8 @@ def evaluate_hypotheses(b, decay=0.0, mapped=False):
     """Fill the score, the estimate and the bounds on the log-likelihood ratio of each hypothesis.
 
     Score and bounds are the largest over its onsets; the estimate is that of the likeliest onset. decay: if a
-    loss may end, the factor by which earlier upper bounds decay and still count; else 0. mapped: see
-    `evaluate_tests`.
+    loss may end, the factor by which earlier upper bounds decay and still count, and the bounds leave out the
+    room; else 0. mapped: see `evaluate_tests`.
     """
     for i in range(n_test_groups(b.n_h)):
         evaluate_tests(b, b.tests[i], tests_in_group(b, i), decay > 0.0, mapped)
@@ -464,7 +466,8 @@ def update_block(b, dt, decay, hi_decay=0.0, mapped=False):
 
 @kernel
 def estimate_theta(kind, N, D):
-    """The most likely theta: N / D; of a loss, in [-1, 0], with the mean and variance that a uniform one has:
+    """The most likely theta: N / D; of a loss, its growth or its end, in [-1, 0], with the mean and variance
+    of a uniform one as prior:
 
     th = (N - LOSS_PRIOR / 2) / (D + LOSS_PRIOR)
     """

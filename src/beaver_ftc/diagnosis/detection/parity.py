@@ -43,8 +43,8 @@ What each view may do, by what is subtracted from its rates (`source`), if the f
     across the column of a surface   VANED       if of a force (*)     yes         needed for both
     across the column of a vane      VANELESS    no                    no          given
 
-(*) Its direction has |m_j| > MIN_FORCE_PART in the row j of its force, and accelerometers cannot break. A
-view whose row j is `confirmer` gives the confirmation. The score of the confirmed view is then
+(*) Its direction has |m_j| > MIN_FORCE_PART in the row j of its force, and accelerometers cannot break. The
+views marked "given" whose row j is `confirmer` give the confirmation. The score of the confirmed view is then
 
     min(peak, P alarm_level / sqrt(2 margin)),    P: the largest peak of the views that confirm
 
@@ -119,7 +119,9 @@ def view_dtype(size: BlockCapacity) -> np.dtype:
         # the rows (i, k, j) that it combines: k = -1 if only two, j the force if it sees one; col: g / |g|
         places=(int, 3), col=5,
         by_force=int,  # whether it sees a force
-        confirmer=int,  # row of the force of the views that confirm this one; -1 if no vane is used
+        # row of the force of the views that confirm this one, read of VANED views alone; -1 for a view of
+        # rates that uses no vane
+        confirmer=int,
         # in this frame: whether the view is used; share of nu along the column that leaks into it
         used=int, leak=float,
         L_rate=3, L_force=3,  # L by the rates and by the forces that it combines, 1/s: fill_view_drift
@@ -136,7 +138,7 @@ def turn_view(view, rows, gust):
 
     q: the effect of the rolling gust on the rows i and k, 1/s, 0 on j, so that the view shows no rolling gust
     either. Without a row k, q is the unit vector of its place, and m lies in the plane of i and j. If
-    g x q = 0, as in the first frame, the view keeps its direction.
+    g x q = 0, as in the first frame, the view keeps its direction, and the share is 0.
 
     Returns the share of the innovation along g that errors e of g (`e_G`) let leak into the view:
 
@@ -168,14 +170,15 @@ def turn_view(view, rows, gust):
 
 
 @kernel
-def fill_view_drift(view, q, gust, subtracted, forces, V):
+def fill_view_drift(view, q, gust, source_gust, forces, V):
     """Fill the drift of a view, (rad/s2)2/s, at a speed V m/s.
 
-    It is that of a bounded uncertainty, that of the flow angle from inertial motion, and that of the rotation
-    of the air, by L_rate = m' L and L_force = sum over the forces of m L_f.
+    It is that of a bounded uncertainty, for source INERTIAL that of the flow angle from inertial motion, and
+    in moving air that of the rotation of the air, by L_rate = m' L and L_force = sum over the forces of m
+    L_f.
 
-    q: see NOISE_RECORD. gust: the gust estimate that gives L and the variance by turns; subtracted: the one
-    that gives the drift, which is that of this view's source.
+    q: see NOISE_RECORD. gust: the gust estimate that gives L and the variance by turns; source_gust: that of
+    this view's source, which gives the drift.
     """
     b = view.block
     L = gust.output.rate_damping
@@ -190,14 +193,14 @@ def fill_view_drift(view, q, gust, subtracted, forces, V):
             for i, f in enumerate(forces.component):
                 view.L_force[j] += m[SIDE_FORCE + i] * f.L[j] * forces.q_ratio
         is_subtracted = b.source != RAW and forces.in_use == 1
-        Q_d += view_drift(subtracted, V, view.L_rate, view.L_force, is_subtracted)
+        Q_d += view_drift(source_gust, V, view.L_rate, view.L_force, is_subtracted)
         add_turn_to_drift(b, gust)
     b.Q_d[0, 0] = Q_d
 
 
 @kernel
 def project_views(views, noise, rows, forces, gust, vaned, vaneless, V):
-    """Bring direction, noise, signatures and regressors of each view to the elapsed frame; V m/s.
+    """Bring direction, noise, signatures and regressors of each view in use to the elapsed frame; V m/s.
 
     gust, vaned, vaneless: the gust estimates (rows.py). A view of RAW rates takes the rotation of the air
     from `gust`, the others from `vaned`; a view without vanes has the drift of `vaneless`. The order matters:
@@ -213,15 +216,16 @@ def project_views(views, noise, rows, forces, gust, vaned, vaneless, V):
         project_rows(b, rows)
         if view.nulled != AXIS_VIEW and b.n_Z > 0:
             fill_leak(b, rows, view.leak, view.col)
-        subtracted = vaneless if b.source >= VANELESS and forces.in_use else air
-        fill_view_drift(view, noise.q, air, subtracted, forces, V)
+        source_gust = vaneless if b.source >= VANELESS and forces.in_use else air
+        fill_view_drift(view, noise.q, air, source_gust, forces, V)
 
 
 @kernel
 def update_views(views, cfg, c, y, dt, k, latched):
-    """Update filter and tests of each view with frame k, as `statistical.update_blocks`; y (5,) measured.
+    """Update filter and tests of each view with frame k, as `statistical.update_blocks`; y (4 + signals,)
+    measured.
 
-        peak <- max((1 - (1 - forget) / PEAK_MEMORY_RATIO) peak, score)
+        peak <- max((1 - (1 - forget) / PEAK_MEMORY_RATIO) peak, score)      0 while the view is not used
 
     c: configuration of the oscillation tests (TONE_RECORD); latched: the detector has raised its alarm, so
     evidence decays and no slot restarts.

@@ -83,8 +83,10 @@ def list_directions(aircraft: Aircraft, with_forces: bool = False) -> Iterator[P
 
     and with accelerometers, for each force that separates surfaces:
 
-        in the plane of a rate and      across the column of each surface that moves both, and across that of
-        its force                       an error of the vane
+        in the plane of the force and   across the column of each surface that it separates; the rate is that
+        a rate                          of the surface's dominant axis
+        in the plane of the force and   across the column of an error of its vane
+        its own rate, pitch or yaw
         the force by itself             at the flow angle from inertial motion
     """
     pitch = [s for s, axis in enumerate(aircraft.dominant_axis) if axis == PITCH]
@@ -169,7 +171,7 @@ def _configure_view(view: np.void, d: ParityDirection, gusty: bool, vaned: bool)
     (`source`), and the force of the views that confirm it.
 
     vaned: whether the gust estimate of the vanes is subtracted from a view that sees no force. A view that
-    sees a force always has it subtracted, unless that view excludes the vane.
+    sees a force always has it subtracted, unless it uses no vane (across a vane's column, or by inertia).
     """
     first, second = d.plane_pair
     if d.by_inertia:
@@ -204,7 +206,7 @@ def _configure_columns(
     view: np.void, d: ParityDirection, rates: np.void, rows: np.void, forces: np.void
 ) -> None:
     """Fill the regressors that a view sees: those of its rates, of its force, of the flow angle from inertial
-    motion, and the leak, which is worked out in flight.
+    motion, and the leak, which is worked out in flight. Without any of its rates or a force there is no leak.
     """
     b = view["block"]
     columns = list(rates["columns"][: rates["n_Z"]])

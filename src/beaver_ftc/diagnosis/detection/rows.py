@@ -31,11 +31,12 @@ A frame has one instant or more. The rows of a frame are filled in this order:
 
     at its start            update_forces: rows of the forces
                             begin_rows: of the rates Z, at the first instant, eta and std[RATES]
-    at each instant inside  add_constants: of the rates Z is summed, and Q becomes that of this instant
+    at each instant inside  add_constants: of the rates Z is summed, and Q, if `noisy`, becomes that of now
     at its end              finish_rows: of the rates nu, G, Gu and the other std, from Q of the last instant
                             project_rows, fill_leak: the directions of each block and view
 
-Letters of the kernels, in addition to those of statistical.py: r is a row, c a column of Z, k a term.
+Letters of the kernels, in addition to those of statistical.py: r is a row, c a column of Z, k a term. Those
+of the forces are in forces.py, but for the chord, which is `chord` here.
 """
 
 import numpy as np
@@ -150,8 +151,8 @@ def fill_signal_slopes(tab, err, y, j, ds):
     """Fill ds (N_SIGNALS,), the change of the table's signals s per unit of reading j of the air data:
 
     alpha, beta         ds_j = 1
-    V                   ds_k = -s_k / V for the normalised rates k, and that of dpt
-    qdyn, kW            that of dpt (`slipstream_slopes`), if the engine has instruments
+    V                   ds_k = -s_k / V for the normalised rates k
+    V, qdyn, kW         that of dpt (`slipstream_slopes`), if errors of the engine's instruments are declared
     """
     ds[:] = 0.0
     if j < AIRSPEED:  # a vane
@@ -166,16 +167,16 @@ def fill_signal_slopes(tab, err, y, j, ds):
 @kernel
 def add_constants(w, noise, rows, err, model, meas, u):
     """Add an instant, which is the share w of the frame, to Z of the rates, rad/s2 per unit of each constant;
-    fill Q as it is at this instant.
+    if `noisy`, fill Q as it is at this instant.
 
         Z_c <- Z_c + w dF_c      Q = Q0 + sum_j (dF_j sigma_j)^2,  j: readings
 
     dF (3, n): acceleration by the moments C (3, n), whose column c is per unit of constant c. For a
     coefficient that is its monomial, times the deflection of its surface, if it has one. For reading j it is
 
-        sum_k C_k dm_k      qdyn: + sum_k C_k m_k / qdyn      C_k, m_k: coefficients and monomials
+        sum_k A_k dm_k [u_s]      qdyn: + sum_k A_k m_k [u_s] / qdyn      A_k, m_k: coefficients and monomials
 
-    with dm the change of the monomials by ds (`fill_signal_slopes`).
+    with dm the change of the monomials by ds (`fill_signal_slopes`), and [u_s] in terms of a surface.
     """
     y = meas.y
     tab = model.moments
@@ -237,9 +238,12 @@ def begin_rows(w, noise, rows, bound, model, meas, u):
 def finish_rows(rows, noise, forces, gust, vaned, vaneless, bound, means, nu, per_cubed):
     """Fill the rows of the rates for the elapsed frame; nu (3,) rad/s2: their innovation.
 
-        rows.nu[source] = nu - acc_mean of the gust estimate that the source subtracts, RAW: none
+        rows.nu[source] = nu - acc_mean of the gust estimate that the source subtracts
+        std[RAW] = std[VANED] = sqrt(Q)      std[VANELESS] = std[RAW] + gust_noise
 
-    gust, vaned, vaneless: the estimates that RATES, VANED and VANELESS subtract. means: of the prediction;
+    gust, vaned, vaneless: the estimates that RATES, VANED (if forces are in use) and VANELESS subtract; RAW
+    subtracts none. Q contains the noise of an estimate by vanes, so std[RAW] is an upper limit. `begin_rows`
+    has filled std[RATES]. INERTIAL has no rows of the rates. means: of the prediction;
     G and Gu of surfaces are with the effects of the frame before (see `predict_force`). per_cubed: see
     ROWS_RECORD.
     """
@@ -264,7 +268,8 @@ def update_forces(rows, forces, gust, du, meas, u, dt):
 
         eta = q_ratio sum_s G_trim_s du_s + MAX_FORCE_LAG_S |f_hat'|
 
-    u (n,) rad: surfaces; du (n,) rad: bounds on their errors; f_hat' rad/s3: rate of change of the force.
+    u (n,) rad: surfaces; du (n,) rad: bounds on their errors; f_hat' rad/s3: change of the force over dt, 0
+    at the first instant.
 
     The order matters: the force uses the flow's rates of the instant before, so `fill_angle_rates` comes
     last. At the first instant those are not known; the rates of this instant are used.
@@ -293,7 +298,7 @@ def update_forces(rows, forces, gust, du, meas, u, dt):
 def fill_force_row(rows, forces, f, r, qdyn):
     """Fill nu and std of row r, of the force f, for every source:
 
-        nu = e      std^2 = var_trim q_ratio^2 + (f_hat q_noise / qdyn)^2 + var_acc
+        nu = e (`innovation` of f)      std^2 = var_trim q_ratio^2 + (f_hat q_noise / qdyn)^2 + var_acc
 
     var_trim: with the noise of the vane, but for INERTIAL, which reads no vane; q_noise, qdyn Pa: noise and
     value of the dynamic pressure; var_acc: by the accelerometer. For INERTIAL, `update_forces` then replaces
@@ -308,12 +313,14 @@ def fill_force_row(rows, forces, f, r, qdyn):
 
 @kernel
 def predict_force(rows, forces, f, gust, i, meas, u):
-    """Predict force i, whose record is f, and fill its innovation a / c - f_hat and the effects of surfaces.
+    """Predict force i, whose record is f, and fill its innovation a / chord - f_hat and the effects of
+    surfaces:
 
-    a m/s2: reading of the force's accelerometer; c m: the chord.
+        Gu_s = G_s u_s,  G_s of the instant before      at the first instant: of this one
 
-    The rows have the effects of the frame before, as for the rates: the law reacts to the noise of a reading,
-    which must not be in a signature too (statistical.md, "Signature from the previous frame").
+    a m/s2: reading of the force's accelerometer. The rows have the effects of the frame before, as for the
+    rates: the law reacts to the noise of a reading, which must not be in a signature too (statistical.md,
+    "Signature from the previous frame").
     """
     r = SIDE_FORCE + i
     for s in range(u.size):
@@ -332,17 +339,17 @@ def add_terms(rows, forces, f, gust, i, meas, u):
     """Fill the columns of the terms of force i, and the effects G of surfaces with the bounds e_G on their
     errors; return the predicted force f_hat, rad/s2.
 
-        f_hat = sum_k C_k Z_k      Z_k = per_C monomial_k [u_s]      per_C = qdyn S / m c
+        f_hat = sum_k C_k Z_k      Z_k = per_C monomial_k [u_s]      per_C = qdyn S / m chord
         G_s = sum_k C_k per_C monomial_k      e_G_s = sum_k tol_k |per_C monomial_k|      k: terms in u_s
 
-    The column of term k is c + k. After the terms of the side force comes that in the rate of sideslip,
-    f_bdot, which is added to f_hat, too.
+    The column of term k is offset + k, so that the first term has the first column of the force. After the
+    terms of the side force comes that in the rate of sideslip, f_bdot, which is added to f_hat, too.
     """
     table = gust.memory.table
     r = SIDE_FORCE + i
     first = table.free_from[_SIDE_ROW + i]
     end = table.surface_to[_SIDE_ROW + i]
-    c = rows.first[i] - first
+    offset = rows.first[i] - first
     f_hat = 0.0
     per_C = meas.y[QDYN] * gust.config.S_m * forces.c_inv
     for s in range(u.size):
@@ -352,14 +359,14 @@ def add_terms(rows, forces, f, gust, i, meas, u):
         Z = per_C * table.power[table.monomial[k]]
         if s >= 0:
             f.G[s] += table.value[k] * Z
-            rows.e_G[s, r] += rows.tol[c + k] * abs(Z)
+            rows.e_G[s, r] += rows.tol[offset + k] * abs(Z)
             Z *= u[s]
-        rows.Z[c + k, r] = Z
+        rows.Z[offset + k, r] = Z
         f_hat += table.value[k] * Z
     if i == SIDE_INDEX:
         span_over_2V = gust.config.span / (2.0 * meas.y[AIRSPEED])
         f_bdot = per_C * forces.CY_bdot * forces.angle_rate[SIDE_INDEX] * span_over_2V
-        rows.Z[c + end, r] = f_bdot
+        rows.Z[offset + end, r] = f_bdot
         f_hat += f_bdot
     return f_hat
 
@@ -404,5 +411,6 @@ def project_rows(b, rows):
 
 @kernel
 def fill_leak(b, rows, leak, col):
-    """Fill the last regressor of a view, leak col' nu: what an error of the column col (5,) lets through."""
+    """Fill the last regressor of a view, leak col' nu, rad/s2: the share `leak` of nu along the column col
+    (5,), which errors of that column let through (parity.py)."""
     b.regressor[b.n_Z - 1, 0] = leak * project(col, row_of(rows.nu, b.source), False)

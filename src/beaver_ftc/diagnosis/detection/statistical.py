@@ -2,8 +2,8 @@
 
 Pitch is one block; roll and yaw, whose noise is correlated, are another. Roll and yaw have two blocks with
 different models of the drift. A random walk reacts fast and ignores constant errors. A drift that returns to
-zero gathers evidence for longer. Pitch has only the latter if no vane measures its gust. The worst-case
-scheme needs no probability; the scenario's `fdi.authority` sets whose alarms and exclusions count.
+zero gathers evidence for longer. Pitch has only the latter if the air moves and no gust is measured. The
+worst-case scheme needs no probability; the scenario's `fdi.authority` sets whose alarms and exclusions count.
 
 statistical_design.py fills the records from what a scenario declares.
 
@@ -11,7 +11,7 @@ Symbols of the kernels:
 
     nu (3,) rad/s2                innovation of the frame
     eta (3,) rad/s2               bound on the uncertainty
-    y, u (n,) rad                 readings, deflections
+    y; u (n,) rad                 readings; positions of healthy surfaces
     w                             one over the number of instants in a frame
     dt s, k                       duration and number of the frame
     b, m, h, v                    block and its number, hypothesis, view
@@ -222,7 +222,7 @@ def confirms_loss(cfg, blocks, fies, loss_number, s):
 
         lo_loss - max_alternatives lo > margin      in some block
 
-    If the loss is weakly excluded (DAMAGE_EXCLUDES), excluded losses are alternatives as well.
+    If declared damage has weakly excluded the loss (DAMAGE_EXCLUDES), excluded losses are alternatives, too.
     """
     revived = loss_number[s] >= 0 and fies[loss_number[s]].weak == DAMAGE_EXCLUDES
     for b in blocks:
@@ -237,15 +237,17 @@ def excludes_loss(cfg, blocks, fies, loss_number, s, pitch_ends, abrupt):
 
         best - max(hi, hi_end) > margin,   hi < share best,   hi_end < share_end best
 
-    best: the largest lo of the alternatives; hi, hi_end: bounds of the loss and of its end. Each block of
-    roll and yaw is compared together with that of pitch, because a loss acts on its own axes only. The end of
-    a loss in pitch counts only if `pitch_ends` is set: a fault outside the class may look like it.
+    best: the largest lo of the alternatives; hi, hi_end: upper bounds of the loss and of its end. Each block
+    of roll and yaw is compared together with that of pitch, because a loss acts on its own axes only; one of
+    the two comparisons is enough. The end of a loss in pitch counts only if `pitch_ends` is set: a fault
+    outside the class may look like it.
 
     A constant theta may explain only a part of a loss. The shares are then MIN_LLR_SHARE:
 
-        w < 1       a loss may begin or end inside a frame of several instants    share, share_end
-        w = 1       it is constant in each frame                                  share_end = 1
-                    a loss that is not declared `abrupt` may grow                 share, else 1
+        w        `abrupt`    share            share_end
+        < 1      any         MIN_LLR_SHARE    MIN_LLR_SHARE    a loss may begin or end inside a frame
+        1        no          MIN_LLR_SHARE    1                a loss may grow, but is constant in each frame
+        1        yes         1                1
     """
     pitch = blocks[likelihood.PITCH_BLOCK]
     share_end = 1.0 if cfg.w == 1.0 else MIN_LLR_SHARE
@@ -277,7 +279,7 @@ def estimate_loss(blocks, s):
 
 @kernel
 def prepare_tests(stat, bound, model, meas, u, dt):
-    """Prepare the next frame: gust, rows, and drift of the blocks at this instant.
+    """Prepare the next frame: gust, rows, drift and eta_rate of the blocks at this instant.
 
     u (n,): positions of healthy surfaces.
     """
@@ -301,7 +303,7 @@ def update_eta_rate(noise, blocks, emap, u):
 
     eta_rate = min(rate0 + moved BOUNDS_PER_TRAVEL, MAX_ETA_RATE),   moved = max_s |u_s - u_old_s| / travel_s
 
-    `emap.u_old` becomes u.
+    travel_s rad: between the stops of the map (`map_dtype`). `emap.u_old` becomes u.
     """
     moved = 0.0
     for s in range(u.size):

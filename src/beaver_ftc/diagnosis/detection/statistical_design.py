@@ -69,8 +69,8 @@ class Entry(NamedTuple):
 def hypotheses_by_block(aircraft: Aircraft) -> Iterator[tuple[tuple[int, ...], list[Entry]]]:
     """Axes and hypotheses of each block, in their order; roll and yaw come twice (statistical.py).
 
-        LOSS, GROWING_LOSS, LOSS_END    of each surface that may be lost and turns the aircraft about an axis
-                                        of the block
+        LOSS, GROWING_LOSS, LOSS_END    of each surface that may lose effectiveness and whose dominant axis is
+                                        in the block
         STEP_FAULT                      on each axis of the block
         ALPHA_CUBED_MOMENT              on pitch
 
@@ -91,7 +91,11 @@ def hypotheses_by_block(aircraft: Aircraft) -> Iterator[tuple[tuple[int, ...], l
 
 def count_tests(aircraft: Aircraft, *directions: ParityDirection) -> int:
     """The number of one-sided tests that the detector makes in a frame, those of these views included: one
-    for each onset and sign of a hypothesis that can raise the alarm, and one for each frequency."""
+    for each onset and sign of a hypothesis that can raise the alarm, and one for each frequency of a view.
+
+    A view of a force across a surface tests for a step, losses and frequencies; the view of an axis, for
+    frequencies. Other views raise no alarm (parity.py).
+    """
     kinds = [entry.kind for _, entries in hypotheses_by_block(aircraft) for entry in entries if entry.alarms]
     n_tones = 0
     for d in directions:
@@ -124,19 +128,24 @@ def configure_statistics(fdi: np.void, declared: Declared, model: np.void, trim:
     The order of the calls is fixed, because a step reads fields that earlier steps have filled:
 
         step                      reads                              filled by
-        configure_gust_speed      test.alarm_level                   _configure_levels
+        configure_gust_speed      test.alarm_level, gust             _configure_levels, configure_gust
         _configure_blocks         test.alarm_level, rows             _configure_levels, configure_rows
         _configure_noise          test.alarm_level                   _configure_levels
         configure_forces          rows, gust                         configure_rows, configure_gust
-        _configure_view_gusts     gust                               configure_gust_speed
-        configure_parity_views    block, forces, rows, vaned         _configure_blocks and the two before
-        _configure_lengths        noise.q, block, gust               _configure_noise, _configure_blocks
-        calm blocks               block                              _configure_lengths
+        _configure_view_gusts     gust                               configure_gust, configure_gust_speed
+        configure_parity_views    block, rows, forces, vaned         _configure_blocks, configure_rows, and
+                                                                     the two before
+        _configure_lengths        test.alarm_level, noise.q, gust    _configure_levels, _configure_noise,
+                                                                     configure_gust
+        configure_attitude        test.margin                        _configure_levels
+        calm blocks               n, a, R_y, P of block              _configure_blocks
+        add_gust_noise            noise.Q0, noise.Q, gust, forces    _configure_noise, configure_gust,
+                                                                     configure_forces
     """
     stat = fdi["statistical"]
     settings = declared.fdi.statistical
     stat["alarm"]["detected_at_s"] = -1.0
-    if settings is None or not fdi["config"]["enabled"]:  # a plug-in diagnoses, or nothing does
+    if settings is None or not fdi["config"]["enabled"]:  # no such detector, or no compiled scheme
         return
     cfg = stat["test"]
     gust = stat["gust"]
@@ -171,7 +180,7 @@ def configure_statistics(fdi: np.void, declared: Declared, model: np.void, trim:
     if monitor["enabled"] and monitor["noisy"]:
         configure_attitude(stat["attitude"], monitor["D"], errors, float(cfg["margin"]), dt_s)
     if gust["output"]["gusty"]:
-        # the filters that assume no gust: they trim as the others, with a drift in any direction
+        # the filters that assume no gust start as the others, all with a random walk as drift
         for name in ("n", "a", "R_y", "P_xx", "P_dd"):
             stat["block"]["calm"][name] = stat["block"][name]
         add_gust_noise(stat, errors, model, *trim[1:], dt_s)
@@ -193,8 +202,8 @@ def _configure_levels(cfg: np.void, declared: Declared, settings: Statistical, n
 
 def _configure_view_gusts(stat: np.void, declared: Declared) -> None:
     """Fill the gust estimates of the views: `vaneless`, by accelerometers in place of the vanes, and `vaned`,
-    by both. Both are copies of that of the rates. The rates use accelerometers as well, unless these may
-    break. If they cannot break, `vaned` would be the same estimate, and is switched off.
+    by both. Both are copies of that of the rates, and use accelerometers. The rates then use them as well,
+    unless these may break. If they cannot break, `vaned` would be the same estimate, and is switched off.
     """
     gust = stat["gust"]
     vaneless = stat["vaneless"]
@@ -206,12 +215,13 @@ def _configure_view_gusts(stat: np.void, declared: Declared) -> None:
 
 
 def _configure_lengths(stat: np.void, V: float, rate_hz: float) -> None:
-    """Fill the correlation length of the drift, m, of the block whose drift reverts to zero and, if the gust
-    is not measured, of the pitch block; fill the factor on the intensity of their gust:
+    """Fill the correlation length of the drift, m, of the block whose drift reverts to zero and, if a gust is
+    declared but not measured, of the pitch block; fill the factor on the intensity of their gust:
 
         Q_scale = (gust_m / length)^2        the same power at low frequency
 
-    gust_m m: correlation length of the gust on these axes, 0 in still air; the length is at most longest_m.
+    gust_m m: correlation length of the gust on these axes, 0 in still air; the length is at most longest_m,
+    the smallest one of a rotating gust if no gust is measured; 0 is no limit.
     """
     cfg = stat["gust"]["config"]
     out = stat["gust"]["output"]
@@ -227,10 +237,11 @@ def _configure_lengths(stat: np.void, V: float, rate_hz: float) -> None:
 
 
 def _configure_blocks(stat: np.void, declared: Declared, rate: float, dt_s: float) -> None:
-    """Fill axes and hypotheses of each block, its level, and its unknown constants.
+    """Fill axes and hypotheses of each block, its level, its unknown constants, and P and R_y of its filter.
 
     rate: largest change of the bounded uncertainty within a frame, over its bound. If a loss is declared
-    abrupt, it neither grows nor ends, and the hypotheses of this are left out.
+    abrupt, it neither grows nor ends, and the hypotheses of this are left out. The column of a hypothesis
+    that raises no alarm is not used.
     """
     aircraft = declared.aircraft
     cfg = stat["test"]
@@ -279,8 +290,9 @@ def _configure_noise(
     (`likelihood.uncertain_share`). The drift only sets how much of it the filters remove. If damage may take
     surfaces, a weaker drift detects most: motion that no loss explains is then rarely an error of the model.
 
-        Q0 = sum_x (F_x sigma_x)^2      Q = Q0 + sum_y (F_y sigma_y)^2, in trim; later as of
-        `rows.add_constants`
+        Q0 = sum_x (F_x sigma_x)^2      Q = Q0 + sum_y (F_y sigma_y)^2, in trim
+
+    In flight `rows.add_constants` updates Q, and adds the noise of the engine's power.
 
     F_x, F_y: slopes of f + G u with rates x and air data y; sigma: noise of the readings, gyros first. Also
     fill G_trim, the magnitude of G in trim.
@@ -311,7 +323,7 @@ def derive_intensity(b: float, omega: float, sigma: float, z: float, dt_s: float
     value of sin(x) / sqrt(x / 2), x half of omega t. Half the alarm level is left for it: noise alone then
     takes up no more than the other half.
 
-    b rad/s2: bound; omega, sigma rad/s; z: alarm level, standard deviations.
+    b rad/s2: bound, at least MIN_ETA_RAD_S2; omega, sigma rad/s; z: alarm level, standard deviations.
     """
     b = max(b, likelihood.MIN_ETA_RAD_S2)
     v = 8.0 * sqrt(2.0) * (b * omega / z) ** 2
@@ -320,23 +332,23 @@ def derive_intensity(b: float, omega: float, sigma: float, z: float, dt_s: float
     return max(hypot(i_step, i_loss), v * dt_s) / b**2
 
 
-def derive_length(stat: np.void, V: float, rate_hz: float, gust_m: float) -> float:
+def derive_length(stat: np.void, V: float, rate_hz: float, longest_m: float) -> float:
     """Return the length, m, of the drift in the second block of roll and yaw, or of pitch without gust
     estimate:
 
-        min(V tau, gust_m),      tau = sqrt(2 T / q) / z
+        min(V tau, longest_m),      tau = sqrt(2 T / q) / z
 
-    V m/s: airspeed in trim; gust_m m: correlation length of the gust, 0 in still air; z: alarm level; q 1/s:
-    intensity of the drift over the bound eta squared (NOISE_RECORD). The drift returns as soon as a bounded
-    uncertainty permits: over the longest window, of T s, an uncertainty that oscillates with the fault moves
-    a test, for a drift of lag tau s, by sqrt(T / 2 q) / tau; half the alarm level is left for this.
-    The drift returns no later than the gust. A gust with a longer correlation length is represented by a
-    stronger one, of equal power at low frequency and more power at high frequency.
+    V m/s: airspeed in trim; longest_m m: limit of the length, 0 for none; z: alarm level; q 1/s: intensity of
+    the drift over the bound eta squared (NOISE_RECORD). The drift returns as soon as a bounded uncertainty
+    permits: over the longest window, of T s, an uncertainty that oscillates with the fault moves a test, for
+    a drift of lag tau s, by sqrt(T / 2 q) / tau; half the alarm level is left for this. The drift returns no
+    later than the gust. A gust with a longer correlation length is represented by a stronger one, of equal
+    power at low frequency and more power at high frequency.
     """
     if stat["noise"]["q"] == 0.0:
         # 0 in still air: nothing is declared that drifts, and the two blocks are one
-        return gust_m
+        return longest_m
     T = 2 ** (N_SLOTS - 1) / rate_hz
     z = float(stat["test"]["alarm_level"])
     tau = sqrt(2.0 * T / stat["noise"]["q"]) / z
-    return min(V * tau, gust_m or np.inf)
+    return min(V * tau, longest_m or np.inf)

@@ -33,8 +33,8 @@ from beaver_ftc.design.table import AIRSPEED, ALPHA, BETA
 from beaver_ftc.diagnosis.detection.likelihood import evidence_ratio
 
 N_TONES = 16
-# A memory of T s resolves frequencies 1 / T apart. A tone halfway between two frequencies of the grid appears
-# with 0.7 of its amplitude.
+# With a memory of T s, a tone 1 / T rad/s off a frequency appears with 0.7 of its amplitude. The frequencies
+# of the grid are 2 / T apart.
 TONE_MEMORY_S = 2.5
 TONES_RAD_S = np.linspace(1.0, 13.0, N_TONES)
 TONE_INTERVAL_S = 0.04
@@ -73,7 +73,7 @@ def tones_dtype(n_Z: int) -> np.dtype:
 
 @kernel
 def within_limits(c, y):
-    """True if airspeed and vane angles y (5,) are near those of normal flight.
+    """True if airspeed and vane angles of y (4 + signals,) are near those of normal flight.
 
     Outside, the tolerances of the tests, which are worked out for trim, do not hold.
     """
@@ -132,10 +132,9 @@ def tone_gain(K_x, K_d, a, z, dt):
 def update_tone_eta(t, c, b, dt):
     """Update `eta` of each frequency: nearly the most that a bounded uncertainty adds to |N|.
 
-        b_0 <- a b_0 + |W| v      b_2 <- rho2 b_2 + |W| v      eta_k = c (b_0 + |b_2|),  v = sum eta
+        b_0 <- a b_0 + v      b_2 <- rho2 b_2 + v      eta_k = c (b_0 + |b_2|),  v = |W| sum_eta
 
-    v: sum over the frames of the update of the bound over sqrt(S) (`sum_eta`), times the gain |W| of
-    `tone_gain`; c: of TONE_RECORD.
+    sum_eta: sum over the frames of the update of the bound over sqrt(S); |W|: `tone_gain`; c: of TONE_RECORD.
 
     |cos x| = 2 / pi (1 + 2/3 cos 2x - 2/15 cos 4x + ...). A bound that varies at twice the tone's frequency
     adds most; the last third of |b_2| is for the harmonics above. One that varies at four times the frequency

@@ -89,10 +89,10 @@ def bound_dtype(n: int, boxes: int = MAX_BOXES) -> np.dtype:
     n_gyro, n_old        bound on the changing part of a gyro's error, now and a frame ago, rad/s
     nu_max               bound on the innovation of one frame, rad/s2
     has_eG, eG, eGu      bound on the error of each surface's own terms in the acceleration: whether it is
-                         filled, per rad of deflection (rad/s2 per rad), at the command (rad/s2); means over
-                         the frame
+                         filled (errors are declared, and faults of all types are examined), per rad of
+                         deflection (rad/s2 per rad), at the command (rad/s2); means over the frame
     extra                by how much the map's error, with a surface at each share of its travel, exceeds that
-                         in eta_bar, rad/s2
+                         in eta_bar, rad/s2; mean over the frame
     const, earth_rate_rad_s, inertia_coupling_error_share: b, w_E, c of `add_published_bound`
     """
     return record(
@@ -130,7 +130,7 @@ def slipstream_bound(err, y):
 
     e_q, e_V, e_rho: relative errors of dynamic pressure, airspeed and density; where they are subtracted, e_q
     and e_V count as MAX_ERROR_SHARE at most, so that the bound stays finite. e_P kW: error of the power P;
-    kw0: by the instruments; kw1: by the density, for all of it; d: density over that at sea level.
+    kw0: by the instruments; kw1: per 1 of error of d, the density over that at sea level.
     """
     e_q = reading_bound(err, Y0 + QDYN, y[QDYN]) / y[QDYN]
     e_V = reading_bound(err, Y0 + AIRSPEED, y[AIRSPEED]) / y[AIRSPEED]
@@ -144,7 +144,8 @@ def slipstream_bound(err, y):
 @kernel
 def fill_magnitudes(err, x, y, u):
     """Fill x, y, u with the magnitudes |v| as measured, and with the largest that the errors allow, |v| + e;
-    for airspeed, which divides, with the smallest, V - e. x_air: these rates with the air's rotation.
+    for airspeed, which divides, with the smallest, V - e, at least _MIN_V_SHARE V. x_air: these rates with
+    the air's rotation.
     """
     for i in range(3):
         err.x[:, i] = err.x_air[:, i] = abs(x[i])
@@ -196,7 +197,8 @@ def add_published_bound(x, model, c, b, w_E, eta):
 
     x (3,) rad/s: rates p, q, r; c (3,): error share of the inertia coupling; C_i x_j x_l rad/s2: its main
     product, Pqr q r, Qpr p r or Rpq p q; b (3,) rad/s2: constant; w_E rad/s: rate of the Earth; kappa_i: sum
-    of the factors of all products of rates on axis i, at least 1; rho: ROUNDING_RAD_S2.
+    of the factors of the products of two rates on axis i, in pitch plus twice the larger of those of p^2 and
+    r^2, at least 1; rho: ROUNDING_RAD_S2.
     """
     p, q, r = x[0], x[1], x[2]
     total = abs(p) + abs(q) + abs(r)
@@ -214,8 +216,8 @@ def add_published_bound(x, model, c, b, w_E, eta):
 
 @kernel
 def least_height(h, h0, h1):
-    """h - (h0 + h1 |h|) / (1 - h1): the least true height, m, for a reading h whose error is up to h0 + h1
-    |truth|.
+    """max(h - (h0 + h1 |h|) / (1 - h1), LEAST_HEIGHT_M): the least true height, m, for a reading h whose
+    error is up to h0 + h1 |truth|.
 
     The ground is at sea level; the model of turbulence has no height below LEAST_HEIGHT_M.
     """
@@ -265,7 +267,8 @@ _INERTIA_NAMES = ("Ix_kg_m2", "Iy_kg_m2", "Iz_kg_m2", "Jxz_kg_m2")
 
 @lru_cache(maxsize=64)
 def inertia_bounds(tol: float, mass: MassProperties) -> np.ndarray:
-    """Largest change of the twelve inertia coefficients for every inertia within its tolerance.
+    """Largest change (12,) of the inertia coefficients, for every inertia within its relative tolerance
+    `tol`.
 
     Each coefficient is monotonic in each inertia while the others are constant, so the largest change is at a
     corner.

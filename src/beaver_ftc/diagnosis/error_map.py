@@ -127,9 +127,9 @@ def level_of_share(emap, share):
 @kernel
 def share_used(emap, s, between, before, n):
     """The largest share of its travel that surface s can use in a frame of n instants, if it stays at one
-    position p from the second instant on:
+    position p from the second instant on, at most 1:
 
-        |p| <= (n |mean| + |before|) / (n - 1)
+        |p| <= (n |mean| + |before|) / (n - 1)      n = 1: |mean|
 
     All are shares of the travel. between: (low, high), rad, of the mean position over the instants; before:
     share at the start of the frame, which may still hold at the first instant.
@@ -186,7 +186,7 @@ def outside_span(emap, i):
 @kernel
 def extra_bound(emap, j, i):
     """By how much the mapped error of axis i at this instant is larger if a surface is at level j of travel,
-    rad/s2.
+    rad/s2; 0 outside the map.
     """
     if emap.outside:
         return 0.0

@@ -129,7 +129,7 @@ class WhiteningFilter:
 
 def with_measured_gust(context: Context, gust_noise: np.ndarray) -> Context:
     """The context of an informed test that is given the gusts which the vanes measure, with an error of
-    gust_noise (3,) rad/s2 in their effect."""
+    gust_noise (3,) rad/s2 in their effect; in still air the context itself."""
     declared = context.declared
     if not declared.air:
         return context
@@ -161,7 +161,9 @@ def healthy_positions(context: Context, columns: FlightColumns, surface: str) ->
 
         u <- u + clip(a (command - u), -step, step)      a = 1 - exp(-bandwidth h)      step = rate h
 
-    in each JSBSim frame of h s; a bandwidth, or a rate limit, of 0 stands for none.
+    in each JSBSim frame of h s, with the command limited to the travel, from the first position of the log
+    on. A bandwidth of 0 stands for no lag, a rate limit of 0 for none. A position is that at the end of its
+    frame.
     """
     s = context.surfaces.index(surface)
     commands = columns[f"{surface}_cmd_rad"]

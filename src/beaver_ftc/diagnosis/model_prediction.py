@@ -58,8 +58,8 @@ def prediction_dtype(n: int) -> np.dtype:
         design=design_dtype(n), actuators=actuators_dtype(n),
         w=float,  # one over the number of instants in a frame
         commanded=n,  # the command in effect
-        u=n, u_old=n,  # positions of healthy surfaces under the command: now, and an instant before
-        # least and greatest position by the declared errors of the actuators: now, and an instant before
+        u=n, u_old=n,  # positions of healthy surfaces under the command: now, before the last `move_surfaces`
+        # least and greatest position by the declared errors of the actuators, at the same two times
         u_lo=n, u_hi=n, u_lo_old=n, u_hi_old=n,
         f=3, G=(3, n),  # f and G at this instant
         x_before=3,  # rates measured at the start of the elapsed frame
@@ -118,10 +118,12 @@ def evaluate_design(pred, meas):
 
 @kernel
 def add_to_sums(pred, bound, layout, all_types):
-    """Add w times this instant to the means over the frame and, for faults of all types, to the extremes:
+    """Add w times this instant to the means over the frame; for faults of all types, update the extremes:
 
     F <- F + w (f + sum_s G_s u_s)      Gu_s <- Gu_s + w G_s u_s      eGu_s <- eGu_s + w eG_s |u_s|
     G, eG, eta_bar likewise             extra_j <- extra_j + w extra_bound(j)      j: level of travel
+
+    eG and eGu only with has_eG, extra only with one_free.
     """
     sums = pred.sums
     G = pred.G
@@ -151,7 +153,8 @@ def add_to_sums(pred, bound, layout, all_types):
 @kernel
 def fill_means(pred, bound):
     """Copy the sums, which are complete, to the means over the elapsed frame: G, G u of each surface,
-    F = f + G u, the extremes, and the bounds. G_old keeps the G of the frame before."""
+    F = f + G u, the extremes, and the bounds eta_bar, eG and eGu. G_old keeps the G of the frame before. With
+    several instants a frame, fill e_Gu, too."""
     sums, means = pred.sums, pred.means
     means.G_old[:] = means.G
     means.G[:] = sums.G
@@ -211,7 +214,8 @@ def evaluate_frame(pred, bound, meas, k, dt):
 
 @kernel
 def begin_sums(pred, bound, layout, all_types, meas):
-    """Restart the sums for the next frame with this instant, at which the old command is still in effect."""
+    """Restart the sums for the next frame with this instant, at which the old command is still in effect. Its
+    rates and n_gyro become those of the start of the frame."""
     sums = pred.sums
     pred.x_before[:], bound.n_old[:] = meas.x, bound.n_gyro
     sums.F[:] = sums.eta_bar[:] = bound.extra[:] = 0.0
@@ -241,9 +245,12 @@ def add_instant(pred, bound, layout, all_types, meas):
 
 @kernel
 def predict_known(pred, with_faults, effectiveness, bias, with_biases):
-    """F_known = F - Gu (1 - effectiveness) + G bias, (3,) rad/s2, over the elapsed frame.
+    """Fill F_known, (3,) rad/s2, over the elapsed frame:
 
-    effectiveness (n,), bias (n,) rad: estimates for each surface, used if `with_faults` and `with_biases`.
+        F_known = F - sum_s Gu_s (1 - effectiveness_s) + sum_s G_s bias_s
+
+    effectiveness (n,), bias (n,) rad: estimates for each surface. Unless `with_faults`, F_known is F; unless
+    `with_biases`, the last sum is left out.
     """
     F, means = pred.F_known, pred.means
     F[:] = means.F
@@ -279,7 +286,8 @@ def move_healthy(pred):
 
 @kernel
 def fill_deflection_errors(pred, err):
-    """du = du0 + max(u_hi - u, u - u_lo), (n,) rad: how far each healthy surface may be from its model."""
+    """du = du0 + max(u_hi - u, u - u_lo), (n,) rad: how far each healthy surface may be from its model.
+    Without errors of the actuators du stays as configured."""
     if pred.actuators.uncertain:
         for s in range(pred.u.size):
             err.du[s] = err.du0 + max(pred.u_hi[s] - pred.u[s], pred.u[s] - pred.u_lo[s])

@@ -112,7 +112,7 @@ class DeclaredBounds(NamedTuple):
 
 class GustReadout(NamedTuple):
     """is_turbulence_declared: whether turbulence is declared; subtracts_measured_gust: whether the effect of
-    the gust that the vanes measure is subtracted from the innovation."""
+    the gust that the vanes measure is subtracted from the innovation; in still air that effect is zero."""
 
     is_turbulence_declared: bool
     subtracts_measured_gust: bool
@@ -171,7 +171,8 @@ class SensorTest(NamedTuple):
     """One redundancy test of the sensor monitor, in the unit of its residual.
 
     residual                             residual of the last sample
-    bound_per_s, bound_per_sample        the two parts of the bound on it; the first is per second
+    bound_per_s, bound_per_sample        parts of the bound on it: h times the first, and the second for this
+                                         sample and for the one before
     gust_gain                            effect on it of a gust that changes by 1 m/s
     filtered_residual, filtered_bound    (poles,): residual and bound through the filters
     """
@@ -295,7 +296,7 @@ class DiagnosisReadout:
 
     @cached_property
     def acceleration_variance_from_input_noise(self) -> np.ndarray:
-        """Variance of the noise of the model's own inputs, (3,) (rad/s2)^2."""
+        """Variance by the noise of the model's own inputs and of the gust estimate, (3,) (rad/s2)^2."""
         return np.array(self._fdi["statistical"]["noise"]["Q"])
 
     @cached_property

@@ -40,7 +40,7 @@ from beaver_ftc.diagnosis.monitors.numbering import (
 from beaver_ftc.diagnosis.monitors.redundancy import AB_NOW, FORCE_JUMP_M_S2, too_steep
 from beaver_ftc.plant.instruments import AX, N_SENSORS, PHI
 
-# Number of identical samples for a sensor that is never called frozen: its sound reading may repeat, because
+# Number of repeated readings for a sensor that is never called frozen: its sound reading may repeat, because
 # the steps of its resolution exceed its noise
 N_FROZEN_NEVER = 1_000_000_000
 JUMP_WINDOW_S = 1.0  # a jump counts within this time after the alarm: later, one by chance is too likely
@@ -62,7 +62,7 @@ FLOW_RECORD = record(r_sum=float, B_sum=float, H_sum=float, y_min=float, y_max=f
 # What the comparison keeps, in the record of the monitor.
 FLOW_FIELDS = {
     "flow": (FLOW_RECORD, 3),
-    "n_same": (int, N_SENSORS),  # for how many samples each reading has been the very same
+    "n_same": (int, N_SENSORS),  # how many samples in a row each reading has equalled the one before
     "cleared": (int, N_SENSORS),  # whether each sensor is cleared
     "turn_max": float,  # rad: largest turn of the attitude beyond sound gyros, 0 if unknown (attitude.py)
     "jump": float,  # largest change of an accelerometer between two samples, m/s2; it fades
@@ -73,8 +73,8 @@ FLOW_FIELDS = {
 
 @kernel
 def count_same(mon, y):
-    """Count in n_same for how many samples each reading has been the very same; update the largest jump of an
-    accelerometer between two samples, which fades:
+    """Count in n_same how many samples in a row each reading has equalled the one before; update the largest
+    jump of an accelerometer between two samples, which fades:
 
         jump <- max((1 - h / JUMP_MEMORY_S) jump, |y_i - y_past_i|)        i: the three accelerometers
     """
@@ -87,7 +87,7 @@ def count_same(mon, y):
 
 @kernel
 def is_frozen(mon, i):
-    """Whether sensor i is frozen: it has given more identical samples than a sound one."""
+    """Whether sensor i is frozen: it has repeated its reading more often than a sound one."""
     return mon.n_same[i] >= mon.config.n_frozen[i]
 
 
@@ -154,10 +154,10 @@ def sum_flow(mon, y):
         alpha = r_sum - clip(r_sum, -(B_sum + H_sum), B_sum + H_sum)        of the incidence
         climb <- a climb + h V alpha cos(phi) cos(theta)
 
-    E, H: bound on an error from the start, and its effect (initial_errors.py). At the sample of the alarm
-    the sums start: r_sum, H_sum at 0, B_sum at the noise of two samples and the effect of a gust. alpha, rad,
-    is the error of the incidence that sound sensors do not explain; climb, m, is its effect on the altitude
-    through each filter of decay a.
+    E, H: bound on an error from the start, as of the alarm, and its effect (initial_errors.py); V m/s:
+    airspeed. At the sample of the alarm the sums start: r_sum, H_sum at 0, B_sum at the noise of two samples
+    and the effect of a gust. alpha, rad, is the error of the incidence that sound sensors do not explain;
+    climb, m, is its effect on the altitude through each filter of decay a.
     """
     for n, f in enumerate(mon.flow):
         j = SPEED_TEST + n
@@ -183,6 +183,8 @@ def sum_exceeds_range(f):
     """Whether the residuals add up to more than an error of a flow sensor whose reading has this range:
 
     |r_sum| > MIN_SUM_RATIO (y_max - y_min) + CLEAR_FACTOR (B_sum + H_sum)
+
+    A reading without a range (y_max = y_min) is judged by `is_frozen` instead.
     """
     span = f.y_max - f.y_min
     return span > 0.0 and abs(f.r_sum) > MIN_SUM_RATIO * span + CLEAR_FACTOR * (f.B_sum + f.H_sum)
@@ -191,7 +193,7 @@ def sum_exceeds_range(f):
 @kernel
 def contradicted(mon, y):
     """Whether the error that the alarm shows, if it were the flow sensor's, would exceed another test that is
-    within its bound: of the density for the airspeed, of the climb for the incidence.
+    within its bound: of the density for the airspeed, of the climb for the incidence, none for the sideslip.
 
         effect > CLEAR_FACTOR (B + e H)        for some pole
 
@@ -199,7 +201,8 @@ def contradicted(mon, y):
         airspeed     effect = 2 (1 - e) / V (|r| - B_speed)        of log(density)
 
     r, B_speed m/s: filtered residual of the speed and its bound; B: bound of the other test; e, H: bound on
-    an error of the flow sensor from the start, and its effect on the other test (initial_errors.py).
+    an error of the flow sensor from the start, as of the alarm, and its effect on the other test
+    (initial_errors.py); e in the airspeed's effect is at most 1.
     """
     alarm = mon.output.alarm_test
     other = DENSITY_TEST if alarm == SPEED_TEST else CLIMB_TEST

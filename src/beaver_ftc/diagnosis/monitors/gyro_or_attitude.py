@@ -121,9 +121,9 @@ def restart_comparison(mon):
 
 @kernel
 def advance_stage(mon):
-    """Advance `stage` at the start of a frame, up to FULL_STAGE. Before that, widen the bound on W by the
-    error that the attitude shows, because an error that a gyro has had from the first sample on has caused no
-    innovation.
+    """Advance `stage` at the start of a frame, up to FULL_STAGE. While it is still smaller, widen the bound
+    on W by the error that the attitude shows, because an error that a gyro has had from the first sample on
+    has caused no innovation.
     """
     if mon.stage < FULL_STAGE and mon.substep == 0:
         mon.stage += 1
@@ -182,7 +182,7 @@ def judge_gyros(mon, bank, bound, dt):
         innovation changes as   the dynamics     verdict
         by this jump of a gyro  show an error
         (fits)                  (shows)
-        no                      yes or no        refuted
+        no                      yes or no        refuted, unless the error varies (see below)
         yes                     yes              confirmed
         yes                     no               refuted if the error is a transient (brief), or so large that
                                                  W would show it (not allowed)
@@ -196,13 +196,14 @@ def judge_gyros(mon, bank, bound, dt):
         allowed    MIN_ESTIMATED_SHARE |shown| <= B + |W| + noise
 
     noise rad/s: bound on the part of shown - shown_past by noise of the attitude; nu, nu_max, jump, tol
-    rad/s2; bank: the detection filters; bound: with nu_max of the elapsed frame, of dt s.
+    rad/s2, nu_max with RATE_ROUNDING, as B in `shows`; bank: the detection filters; bound: with nu_max of the
+    elapsed frame, of dt s.
 
     A transient appears inside a frame, and is absent in all samples of the next frame. It is not an error of
     a gyro: that stays, and if it varies, it is not so small in every sample. If an error is present in every
     sample and varies between samples (varies), the innovation cannot be compared with its jump: the
     innovation contains the errors at the start of each frame, and the attitude shows those of the samples
-    before. The verdict then stays open, unless the last row but one of the table applies.
+    before. The verdict then stays open, unless brief or not allowed, with no error shown, refutes it.
     """
     nu = bank.output.innovation
     for i, g in enumerate(mon.gyro):

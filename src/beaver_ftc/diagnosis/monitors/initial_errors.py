@@ -185,7 +185,7 @@ def angle_of_chord(x):
 def start_bounds(mon, y):
     """Set E and E_start to the largest errors with which an aircraft can fly at the truth:
 
-        alpha, beta    2 sin((|reading| + MAX_FLOW_ANGLE_RAD) / 2)
+        alpha, beta    2 sin(min(|reading| + MAX_FLOW_ANGLE_RAD, pi) / 2)
         phi, theta     MAX_CHORD
         airspeed       max(V / V_air sqrt(1 + DENSITY_SHARE) - 1, 1 - V / V_air sqrt(1 - DENSITY_SHARE))
 
@@ -283,7 +283,7 @@ def share_across(y):
 @kernel
 def fill_flow_effects(mon, y, rate, dt2, a_max):
     """Fill H and C of the tests of flow, rad; sec_max: 1 / cos(beta_max), beta_max the largest |beta| if beta
-    is off. In the body: acc: `in_plane` of a; side: exp(i beta), and sb its |sin|; secs: sec sec_max.
+    is off. In the code: acc: `in_plane` of a; side: exp(i beta), and sb its |sin|; secs: sec sec_max.
 
                  ALPHA_FLOW                                BETA_FLOW
         V        sec A_V                                   sec A_V
@@ -330,7 +330,8 @@ def fill_flow_effects(mon, y, rate, dt2, a_max):
 def fill_climb_effects(mon, y):
     """Fill H and C of CLIMB, m:
 
-        H    V climb    alpha lift    beta dt V |(vertical.real, d_y)|    phi dt V share_across    theta dt V
+        hypothesis    V        alpha    beta                            phi                  theta
+        H             climb    lift     dt V |(vertical.real, d_y)|     dt V share_across    dt V
 
     d: the vertical unit vector downwards; vertical: `in_plane` of it; lift = dt V cos(beta) |vertical|.
 
@@ -365,8 +366,9 @@ def fill_effects(mon, y_now):
     predicted.
 
         dt2 = dt (1 + dt (a_max / V + w))        a_max, w: bounds on |a| and on the rate in the step
-        SPEED      H = V 0, alpha A, beta A, phi G share_across, theta G
-        DENSITY    H = V |2 log(V_now / V)|
+        hypothesis    V                       alpha    beta    phi               theta
+        H, SPEED      0                       A        A       G share_across    G
+        H, DENSITY    |2 log(V_now / V)|      0        0       0                 0
 
     V        the true log V changes by (1 + x) times what the reading shows. The density contains -2 log V,
              so its residual has the error 2 x log(V_now / V)
@@ -444,7 +446,7 @@ def tighten_bounds(mon):
 @kernel
 def update_bounds(mon, y):
     """Update all bounds by the sample y, which has just been tested. In a steep attitude the tests of turning
-    restart, and so does what their filters have summed of C."""
+    restart, and so does what the filters have summed of C; E, d, H and H_m then stay as they are."""
     initial = mon.initial
     if too_steep(mon, y):
         initial.C_m[:] = 0.0
@@ -463,7 +465,7 @@ def update_bounds(mon, y):
 def refutes_initial(mon, h, j):
     """Whether a test's residual is larger than sound sensors and the error of hypothesis h explain: for a
     pole m, r_m > factor B_m + x H_m, x = E + d. No hypothesis has an effect on the engine's tests and later
-    ones.
+    ones, which refute it if they exceed their bounds.
     """
     initial = mon.initial
     if j >= RPM_TEST:

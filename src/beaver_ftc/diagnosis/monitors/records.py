@@ -36,8 +36,8 @@ ERRORS = {"e_zero": "worst", "e_slope": "slope", "const": "steady"}
 MAX_AIRSPEED_OVER_TRIM = 1.4  # largest airspeed of a flight, as a share of that in trim
 # Rate at which the attitude corrects a replaced body rate, if the attitude's noise is declared
 RATE_GAIN_PER_S = 3.0
-# Number of identical samples that a sound sensor does not give: without rounding of its reading, and with a
-# noise of more than a quarter of its resolution.
+# Number of readings in a row, each equal to the one before, that a sound sensor does not give: without
+# rounding of its reading, and with a noise of more than a quarter of its resolution.
 N_FROZEN_EXACT = 3
 N_FROZEN_ROUNDED = 50
 UNANTICIPATED_DELAY_S = 1.0  # time from the alarm, after which a fault is unanticipated without an isolation
@@ -45,7 +45,7 @@ MONITOR_CONFIG_RECORD = record(
     enabled=int, substeps=int, has_engine=int, y_trim=N_SENSORS,  # y_trim: readings in trim
     rate_gain=float,  # share of its error that a replaced rate corrects in one sample
     noisy=int,  # whether the attitude is noisy: then a surface is isolated only once no gyro can be the cause
-    n_frozen=(int, N_SENSORS),  # number of identical samples from which a reading counts as frozen
+    n_frozen=(int, N_SENSORS),  # number of repeated samples (`n_same`) from which a reading counts as frozen
     D=(3, 3),  # 1/s: body rates decay with rate' = -D rate
 )  # fmt: skip
 
@@ -94,8 +94,9 @@ def configure_sensor_monitor(monitor: np.void, declared: Declared, design: np.vo
 
 
 def configure_errors(monitor: np.void, declared: Declared) -> None:
-    """Fill the declared errors of the readings, and the number of identical samples from which each is
-    frozen; a sample is a JSBSim frame. The attitude is noisy if an error of it changes: worst > steady."""
+    """Fill the declared errors of the readings, and the number of repeated samples from which each is frozen;
+    a sample is a JSBSim frame, and a sensor may be read once in several. The attitude is noisy if an error of
+    it changes: worst > steady."""
     config = monitor["config"]
     sensors = declared.sensors
     h = float(monitor["h"])
@@ -110,7 +111,7 @@ def configure_errors(monitor: np.void, declared: Declared) -> None:
 
 
 def n_frozen(noise: float, resolution: float) -> int:
-    """Number of identical samples that a sound sensor of this noise and resolution does not give."""
+    """Number of repeated readings that a sound sensor of this noise and resolution does not give."""
     if resolution == 0.0:
         return N_FROZEN_EXACT
     return N_FROZEN_ROUNDED if noise > resolution / 4.0 else N_FROZEN_NEVER

@@ -197,7 +197,7 @@ def predict_readings(mon):
 
 @kernel
 def half_density(y):
-    """qdyn / V^2, kg/m3."""
+    """qdyn / V^2, kg/m3, at least MIN_HALF_DENSITY."""
     return max(y[I_QDYN] / y[I_AIRSPEED] ** 2, MIN_HALF_DENSITY)
 
 
@@ -207,9 +207,10 @@ def fill_residuals(mon, y, q):
 
         turning    2 (q* q_now), rad: the vector part, small, is half the turn; -q_now is the same attitude
         density    log(rho / rho_past),  rho = qdyn / V^2
-        others     y - y_pred
+        others     y - y_pred, of an angle wrapped
 
-    q, q_now: the attitude as predicted, and as measured.
+    q, q_now: the attitude as predicted, and as measured. The tests of the engine and of duplicate sensors
+    have their residuals of `compare`.
     """
     turn = times(inverse(q), attitude(y))
     side = 2.0 if turn[0].real >= 0.0 else -2.0
@@ -273,7 +274,8 @@ def bound_acceleration(mon, w_max, e_w):
 
 @kernel
 def bound_attitude(mon, y, w_max, e_w):
-    """Fill per_s and per_sample for the tests of turning and of the angles; sec: largest 1 / cos(theta).
+    """Fill per_s for the tests of turning and of the angles, and per_sample for those of turning; sec:
+    largest 1 / cos(theta).
 
         turning, axis i   per_s = EARTH_TURN + 2 drift + e_i + axes      per_sample = n_i + coupled_i
         axes =   w_max (e_phi + (1 + sec) e_theta + e_psi)        constant error: it changes J

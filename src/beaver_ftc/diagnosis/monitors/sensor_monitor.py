@@ -138,7 +138,7 @@ def isolate_sensor(mon, measured, verdict, bank, bound, dt, t):
 
     A missing reading isolates its sensor. The test with the largest ratio beyond 1 raises the alarm. Each
     sample from then on may exclude suspects. The gyros are judged only at the first sample of a frame, where
-    the innovation of the elapsed frame is new.
+    the innovation of the elapsed frame is new, and from FULL_STAGE on.
     """
     o = mon.output
     worst = np.argmax(mon.ratio)
@@ -170,7 +170,7 @@ def raise_alarm(mon, verdict, t):
     """Raise the alarm of the sensors at t s, if it is not raised.
 
     A surface that was detected more than MIN_LEAD_S before was detected with sound sensors, and stays
-    detected. Otherwise the conclusion about surfaces is void, and the alarm dates from it.
+    detected. If it was detected later, that conclusion is void, and the alarm dates from it.
     """
     o = mon.output
     if o.alarmed:
@@ -282,8 +282,8 @@ def estimate_reading(mon, pred, y, i):
     """The estimate of a sensor's reading from the other sensors, in its unit:
 
     rates       `estimate_rate`
-    airspeed    sqrt(2 qdyn / rho)
-    qdyn        rho airspeed^2 / 2,    rho = 2 qdyn / airspeed^2 of the sample before
+    airspeed    sqrt(2 qdyn / rho), at least MIN_AIRSPEED_MPS
+    qdyn        rho airspeed^2 / 2        in both rho = 2 qdyn / airspeed^2 of the sample before
     vanes       the prediction of redundancy.py, returning to trim with the time constant VANE_RETURN_S
     others      the prediction of redundancy.py
     """
@@ -305,7 +305,7 @@ def estimate_rate(mon, pred, i):
 
         y_i = y_past_i + gain residual_i / h + h acc_i,    acc = f + G u [+ F_known - F]
 
-    acc rad/s2: acceleration by the model, with the effect of surface faults if they stay isolated; gain:
+    acc rad/s2: acceleration by the model, with the effect of surface faults if that conclusion stays; gain:
     `rate_gain`. The estimate is the y_past of the next sample, whose residual shows its error. In the first
     sample the reading of the broken gyro is still in y_past: if the attitude is noisy (gain < 1), the
     filtered residual times its pole, lam r, then takes the place of gain residual / h.

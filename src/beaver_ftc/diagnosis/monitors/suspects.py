@@ -6,17 +6,17 @@ and flow_or_force.py, exclude some of them:
     test of the alarm      suspects                     excluded by
     turning, angles        gyro of an axis, one angle   the dynamics of the rates (gyro_or_attitude.py); tests
                                                         of other axes and angles
-    speed                  airspeed, accelerometers     being cleared (flow_or_force.py)
-    incidence, sideslip    vane, accelerometers, gyros  being cleared; vane and gyros by the tests of turning
-    density                airspeed, dynamic pressure   for the airspeed its own test; for the pressure any
-                                                        other test
-    climb                  altitude                     any other test
+    speed                  airspeed, accelerometers     being cleared (flow_or_force.py) incidence, sideslip
+    vane, accelerometers, gyros  being cleared; the tests of turning: they leave one gyro density
+    airspeed, dynamic pressure   for the airspeed its own test; for the pressure any
+                                                        other test before those of the engine
+    climb                  altitude                     any other test before those of the engine
     engine                 the sensor of the test
     equation of a row      the sensor of the row
     equal                  the sensor, the reading      that reading's own test
                            that it should equal
-    any                    alpha, beta, airspeed, phi,  the tests that an error from the start does not
-                           theta                        explain (initial_errors.py)
+    any but equal          alpha, beta, airspeed, phi,  the tests that an error from the start does not
+                           theta                        explain (initial_errors.py); a frozen suspect
 
 Letters: redundancy.py and initial_errors.py. `mon.exceeded` (N_TESTS,): which tests have exceeded their
 bounds since the alarm; alarm: number of the test that raised it.
@@ -94,7 +94,7 @@ def find_suspects(mon):
     """Fill suspect (N_SENSORS,): the sensors whose error explains all tests since the alarm.
 
     Errors from the start come last: another sensor's error from the start does not explain why a suspect is
-    frozen, so none is added to a frozen suspect.
+    frozen, so none is added to a frozen suspect. None is added to the suspects of a duplicate sensor, either.
     """
     suspect = mon.output.suspect
     alarm = mon.output.alarm_test
@@ -154,7 +154,7 @@ def suspect_attitude(mon):
         angle    if no test of another angle shows an error that this angle's error from the start does not
                  explain (of psi: any error), the error explains the tests of turning (`explains_turns`) or
                  its own test shows it, and the gyro that would be at fault instead is not confirmed
-                 if its reading stands still, but too shortly to call it frozen, and its error explains the
+                 also if its reading repeats, but too shortly to call it frozen, and its error explains the
                  tests of turning
 
     turns, angles (3,): which tests of turning, and of the angles, have been exceeded; refuted (2, 3): which
@@ -189,10 +189,10 @@ def explains_turns(mon, i):
         now      |r_j| > c (|r_own| + B_own) + B_j + E H
         since    |beyond_ij| > B_j + E H + c_max B_own + tilt swing_i
 
-    r_own, B_own rad: filtered residual of the angle's own test, and its bound; c: |turn_share| + tilt,
-    rad/rad: the attitude may be off by tilt = e_phi + e_theta, rad; beyond, c_max, swing: of
-    `gyro_or_attitude.filter_beyond`; E, H: bound on an error of the angle from the start, and its effect
-    (initial_errors.py), 0 for psi.
+    r_own, B_own rad: filtered residual of the angle's own test, and its bound; r_j, B_j: of the test of
+    turning; c: |turn_share| + tilt, rad/rad: the attitude may be off by tilt = e_phi + e_theta, rad; beyond,
+    c_max, swing: of `gyro_or_attitude.filter_beyond`; E, H: bound on an error of the angle from the start, as
+    of the alarm, and its effect (initial_errors.py); E is 0 for psi.
     """
     own_test = ANGLE_TEST + i
     h = min(H_PHI + i, N_INITIAL - 1)  # psi has no hypothesis: any h, as initial is 0
@@ -256,9 +256,10 @@ def gyro_hidden(mon, j, i):
 def suspect_accelerometers(mon):
     """Suspect the accelerometers along whose axis most of the spurious velocity dv is, m/s:
 
-        dv_i >= MIN_AXIS_SHARE max(dv) - B,    B = B_V + V (B_alpha + B_beta)        of sound sensors
+        dv_i >= MIN_AXIS_SHARE max(dv) - B,    B = B_V + V (B_alpha + B_beta)
 
-    If accelerometers are frozen, the last of them is suspected, and no other accelerometer.
+    B_V, B_alpha, B_beta: B_sum of the three flow sensors, the part of sound sensors. If accelerometers are
+    frozen, the last of them is suspected, and no other accelerometer.
 
     dV, da, db: records of speed, incidence and sideslip; their r_sum, m/s and rad, add up to dv in axes along
     the flow. plane: dv turned by beta; its imaginary part is along the second body axis. body: then turned by
@@ -281,7 +282,7 @@ def suspect_accelerometers(mon):
 @kernel
 def suspect_lone(mon, alarm):
     """Suspect the sensor of a test that has a sensor of its own: of the density or the climb if no other test
-    of kinematics is exceeded; of the engine, and of the equations of rows, always.
+    before those of the engine is exceeded; of the engine, and of the equations of rows, always.
 
     The alarm of the density suspects the airspeed, too, unless such an error would exceed the bound of the
     airspeed's own test while that test shows none:
@@ -289,7 +290,7 @@ def suspect_lone(mon, alarm):
         |r_density| > 2 HIDDEN_FACTOR (1 + e) / V B_speed + e H        for some pole
 
     e: bound on an error of the airspeed from the start, a share; H: its effect on the density. The test of a
-    frozen airspeed need not show an error, so an airspeed that stands still is suspected.
+    frozen airspeed need not show an error, so an airspeed whose reading has just repeated is suspected.
     """
     suspect = mon.output.suspect
     suspect[SENSOR_OF[alarm]] = alarm >= RPM_TEST or alone(mon.exceeded[:RPM_TEST], alarm)

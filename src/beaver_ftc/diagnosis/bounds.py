@@ -145,7 +145,8 @@ def slipstream_bound(err, y):
 def fill_magnitudes(err, x, y, u):
     """Fill x, y, u with the magnitudes |v| as measured, and with the largest that the errors allow, |v| + e;
     for airspeed, which divides, with the smallest, V - e, at least _MIN_V_SHARE V. x_air: these rates with
-    the air's rotation.
+    the air's rotation. Signals from dpt on count as exact, except dpt if the engine's instruments have
+    errors.
     """
     for i in range(3):
         err.x[:, i] = err.x_air[:, i] = abs(x[i])

@@ -144,6 +144,7 @@ def coefficient_bounds(declared: Declared, model: np.void, y: np.ndarray, u: np.
     dI = InertiaCoefficients(*inertia_bounds(declared.inertia, declared.mass))
     nominal = inertia_coefficients(declared.mass)
     e_inertia = max(dI.Pl / nominal.Pl, dI.Qm / nominal.Qm, dI.Rn / nominal.Rn)
+    # e_inertia is a number of NumPy, so the list is added as an array
     relative = e_inertia + [_signal_error(errors, term) for term in aircraft.moments]
     tol = declared.coefficients.absolute(aircraft.moments, C) + relative * C
     b, c = aircraft.geometry.span_m, aircraft.geometry.chord_m

@@ -21,7 +21,8 @@ class IsolationEstimator(NamedTuple):
 
     theta_min, theta_max    known set of its parameter
     active_axes             the axes on which its residuals count
-    parity_direction        (3,): direction in which the fault has no effect, or 0 if no direction is used
+    parity_direction        (3,): direction in which the fault has no effect; 0 if the surface moves neither
+                            roll nor yaw, or before the first frame
     """
 
     hypothesis_kind: int

@@ -15,9 +15,9 @@ Errors of coefficients are constants c_j, |c_j| <= tol_j, times known regressors
 they add sum_j c_j R_j to N, with R_j = sum g_s' S^-1 g_rj. That is at most sum_j tol_j |R_j|, which is
 subtracted from the evidence.
 
-A bounded uncertainty |d| <= eta_bar is not noise. g_d is its response of the filter. The response to a unit
-constant settles at g_0; the response to a unit step also has a transient whose sum is 1 / K_d and whose
-magnitudes sum to at most RINGING / K_d. With w = S^-1 g_s, summation by parts gives
+A bounded uncertainty |d| <= eta_bar is not noise. g_d is the response of the filter to it. The response to a
+unit constant settles at g_0; the response to a unit step also has a transient whose sum is 1 / K_d and whose
+magnitudes sum to at most RINGING / K_d (RINGING_FACTOR). With w = S^-1 g_s, summation by parts gives
 
     |sum w' g_d| <= eta_bar (|g_0| sum |w| + RINGING / K_d TV(w)),     TV(w) = sum |w[k] - w[k-1]|
 

@@ -11,8 +11,8 @@ direction is a view: it has a whitening filter of its own and tests for a step, 
 
 * each axis, for the surfaces that do not move it;
 * in a plane that several surfaces move, the direction across the column g of each: m = (-g_2, g_1) / |g|. The
-  planes are roll and yaw; if accelerometers are used (forces.py), also pitch and normal force, yaw and side
-  force.
+  planes are roll and yaw; if accelerometers are used (forces.py), also pitch and normal force, and roll or
+  yaw and side force.
 
 Declared errors may turn the column. Then a share of the innovation along the column leaks into the
 projection, at most (|m_1| e_1 + |m_2| e_2) / (|g| - |m_2| e_1 - |m_1| e_2), where e_1 and e_2 bound the

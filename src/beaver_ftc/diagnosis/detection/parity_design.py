@@ -206,7 +206,7 @@ def _configure_columns(
     view: np.void, d: ParityDirection, rates: np.void, rows: np.void, forces: np.void
 ) -> None:
     """Fill the regressors that a view sees: those of its rates, of its force, of the flow angle from inertial
-    motion, and the leak, which is worked out in flight. Without any of its rates or a force there is no leak.
+    motion, and the leak, which is worked out in flight. A view of rates without regressors has no leak.
     """
     b = view["block"]
     columns = list(rates["columns"][: rates["n_Z"]])

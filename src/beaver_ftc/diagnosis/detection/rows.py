@@ -27,7 +27,8 @@ Z has these columns; a row that does not see a column has a zero there:
     first[0] ...    side force: coefficients, rate of sideslip, bias of the accelerometer if any, scale, drift
     first[1] ...    normal force: the same without the rate of sideslip
 
-A frame has one instant or more. The rows of a frame are filled in this order:
+A frame has one instant or more; forces and views are used only if it has one. The rows of a frame are filled
+in this order:
 
     at its start            update_forces: rows of the forces
                             begin_rows: of the rates Z, at the first instant, eta and std[RATES]

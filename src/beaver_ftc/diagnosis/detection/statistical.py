@@ -242,7 +242,7 @@ def excludes_loss(cfg, blocks, fies, loss_number, s, pitch_ends, abrupt):
     the two comparisons is enough. The end of a loss in pitch counts only if `pitch_ends` is set: a fault
     outside the class may look like it.
 
-    A constant theta may explain only a part of a loss. The shares are then MIN_LLR_SHARE:
+    A constant theta may explain only a part of a loss, for which the shares allow:
 
         w        `abrupt`    share            share_end
         < 1      any         MIN_LLR_SHARE    MIN_LLR_SHARE    a loss may begin or end inside a frame

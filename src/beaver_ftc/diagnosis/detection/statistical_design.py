@@ -93,8 +93,8 @@ def count_tests(aircraft: Aircraft, *directions: ParityDirection) -> int:
     """The number of one-sided tests that the detector makes in a frame, those of these views included: one
     for each onset and sign of a hypothesis that can raise the alarm, and one for each frequency of a view.
 
-    A view of a force across a surface tests for a step, losses and frequencies; the view of an axis, for
-    frequencies. Other views raise no alarm (parity.py).
+    A view of a force across a surface tests for a step, losses and frequencies; the view of an axis of the
+    rates, for frequencies. Other views raise no alarm (parity.py).
     """
     kinds = [entry.kind for _, entries in hypotheses_by_block(aircraft) for entry in entries if entry.alarms]
     n_tones = 0
@@ -220,8 +220,9 @@ def _configure_lengths(stat: np.void, V: float, rate_hz: float) -> None:
 
         Q_scale = (gust_m / length)^2        the same power at low frequency
 
-    gust_m m: correlation length of the gust on these axes, 0 in still air; the length is at most longest_m,
-    the smallest one of a rotating gust if no gust is measured; 0 is no limit.
+    gust_m m: correlation length of the gust on these axes, 0 in still air. The length is at most longest_m:
+    gust_m, but for roll and yaw the smallest of the three lengths if the gust is visible only coarsely. 0 is
+    no limit.
     """
     cfg = stat["gust"]["config"]
     out = stat["gust"]["output"]

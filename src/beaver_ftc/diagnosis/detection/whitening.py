@@ -18,7 +18,8 @@ The declared drift is an upper limit. In calmer air the filter interprets gyro n
 innovation g is then partly predictable: from p = g - g_0, where g_0 is the innovation of a second filter
 without gust, `calm`. The control law reacts to the same noise, so a loss would seem to be present without
 one. The fraction of p in g is estimated, lambda = sum p' S^-1 g / sum p' S^-1 p: 0 in air as declared, 1 in
-calm air. The evidence that lambda p contributes is subtracted (likelihood.py).
+calm air; `update_calm_part` takes it larger, to be safe. The evidence that lambda p contributes is subtracted
+(likelihood.py).
 
 Letters of the kernels. A block b has n axes, 1 or 2; i and j are axes; a digit at the end is an axis.
 

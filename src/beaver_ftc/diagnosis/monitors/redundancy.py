@@ -9,9 +9,9 @@
 
 The integration is that of JSBSim (rates held over the step; velocity by Adams and Bashforth's second order),
 so that residuals of sound sensors contain only what is left out here: the Earth turns and is round. Every
-residual passes filters of several poles, with a bound on the effect of the declared errors of all sensors
-together, as in detection/filters.py. Declared turbulence widens the bounds of flow and climb by the effect of
-its gusts within a filter's memory.
+residual, except those of the tests `engine` and `equal`, passes filters of several poles, with a bound on the
+effect of the declared errors of all sensors together, as in detection/filters.py. Declared turbulence widens
+the bounds of flow and climb by the effect of its gusts within a filter's memory.
 
     y, y_past, y_pred  (N_SENSORS,)  readings now, in the sample before, as predicted from that; SI
     e, e_past, e_older (N_SENSORS,)  bounds on their errors: now, in the sample before, in that before it

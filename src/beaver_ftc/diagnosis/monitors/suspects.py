@@ -6,9 +6,10 @@ and flow_or_force.py, exclude some of them:
     test of the alarm      suspects                     excluded by
     turning, angles        gyro of an axis, one angle   the dynamics of the rates (gyro_or_attitude.py); tests
                                                         of other axes and angles
-    speed                  airspeed, accelerometers     being cleared (flow_or_force.py) incidence, sideslip
-    vane, accelerometers, gyros  being cleared; the tests of turning: they leave one gyro density
-    airspeed, dynamic pressure   for the airspeed its own test; for the pressure any
+    speed                  airspeed, accelerometers     being cleared (flow_or_force.py)
+    incidence, sideslip    vane, accelerometers, gyros  being cleared; the tests of turning, which leave
+                                                        one gyro at most
+    density                airspeed, dynamic pressure   for the airspeed its own test; for the pressure any
                                                         other test before those of the engine
     climb                  altitude                     any other test before those of the engine
     engine                 the sensor of the test

@@ -3,8 +3,8 @@
     fhat_i = th_i^T Z_i,    Z_i[a, b, c] = g_a(v1) g_b(v2) g_c(v3),    th_i' = P{Gamma Z_i eps_i}
 
 Each axis i has a network with three inputs: v1 is alpha (pitch) or beta, rad; v2 the rate of the axis, rad/s;
-v3 the deflection of the surface that leads it, rad. g (centres,): a Gaussian at each centre of the input,
-together of unit length.
+v3 the deflection of the surface that leads the axis, rad. g (centres,): a Gaussian at each centre of the
+input, together of unit length.
 """
 
 import numpy as np
@@ -15,7 +15,7 @@ from beaver_ftc.diagnosis.detection.fdae import fill_gaussians, train
 from beaver_ftc.diagnosis.state import PITCH
 
 # Centres of the network's basis functions on each axis of the aircraft: of alpha (pitch) or beta, rad; of the
-# rate of the axis, rad/s; of the deflection of the surface that leads it, as a share of its travel.
+# rate of the axis, rad/s; of the deflection of the surface that leads the axis, as a share of its travel.
 ALPHA_CENTRES_RAD, BETA_CENTRES_RAD = np.linspace(-0.1, 0.5, 9), np.linspace(-0.4, 0.4, 9)
 RATE_CENTRES_RAD_S, TRAVEL_SHARE_CENTRES = np.linspace(-0.3, 0.3, 3), np.linspace(0.0, 1.0, 3)
 N_CENTRES = (len(ALPHA_CENTRES_RAD), len(RATE_CENTRES_RAD_S), len(TRAVEL_SHARE_CENTRES))

@@ -16,8 +16,8 @@ that a sensor cannot be the broken one:
                      an accelerometer is frozen
     gyro of an axis  the attitude shows no such turn about the axis (`clear_gyros`)
 
-Whether a sensor is frozen is judged here, too. Letters: redundancy.py and initial_errors.py; f is the record
-of a flow sensor.
+Whether a sensor is frozen is judged here, too. Letters: redundancy.py and initial_errors.py; h s is the time
+between two samples; f is the record of a flow sensor, n its number.
 """
 
 import numpy as np
@@ -208,15 +208,15 @@ def contradicted(mon, y):
     other = DENSITY_TEST if alarm == SPEED_TEST else CLIMB_TEST
     if alarm == BETA_TEST or mon.exceeded[other]:
         return False
-    h = alarm - SPEED_TEST
-    e = mon.initial.E_alarm[h]
+    n = alarm - SPEED_TEST
+    e = mon.initial.E_alarm[n]
     r = mon.r[alarm]
     B = mon.B[alarm]
     # log(density) changes by twice the relative change of the airspeed
     share = 2.0 * (1.0 - min(e, 1.0)) / speed(y)
     for m, climb in enumerate(mon.climb):
         effect = abs(climb) if alarm == ALPHA_TEST else share * (abs(r[m]) - B[m])
-        if effect > CLEAR_FACTOR * (mon.B[other, m] + e * mon.initial.H_m[h, other, m]):
+        if effect > CLEAR_FACTOR * (mon.B[other, m] + e * mon.initial.H_m[n, other, m]):
             return True
     return False
 

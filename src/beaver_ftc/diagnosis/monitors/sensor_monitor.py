@@ -95,7 +95,7 @@ def expect_pressure(mon, pressure):
 @kernel
 def check_sensors(mon, pred, measured, verdict, bank, bound, dt, t):
     """Test the sensors at t s, and replace in `measured` the readings of broken ones. One call is one sample;
-    a frame has `substeps` samples.
+    a frame has `substeps` samples, the last of them at its end.
 
     bank: with the innovation of the elapsed frame, of dt s; bound: with the bound on that innovation. Both
     are new at the first sample of a frame, substep 0. The order matters: all comparisons are with y_past, the
@@ -306,9 +306,11 @@ def estimate_rate(mon, pred, i):
         y_i = y_past_i + gain residual_i / h + h acc_i,    acc = f + G u [+ F_known - F]
 
     acc rad/s2: acceleration by the model, with the effect of surface faults if that conclusion stays; gain:
-    `rate_gain`. The estimate is the y_past of the next sample, whose residual shows its error. In the first
-    sample the reading of the broken gyro is still in y_past: if the attitude is noisy (gain < 1), the
-    filtered residual times its pole, lam r, then takes the place of gain residual / h.
+    `rate_gain`; u (n,) rad: positions in the elapsed step at the first sample of a frame, else those of now,
+    which a lagging actuator has moved on by a step. The estimate is the y_past of the next sample, whose
+    residual shows its error. In the first sample the reading of the broken gyro is still in y_past: if the
+    attitude is noisy (gain < 1), the filtered residual times its pole, lam r, then takes the place of gain
+    residual / h.
     """
     gain = mon.config.rate_gain
     acc = pred.f[i]

@@ -19,8 +19,8 @@ and flow_or_force.py, exclude some of them:
     any but equal          alpha, beta, airspeed, phi,  the tests that an error from the start does not
                            theta                        explain (initial_errors.py); a frozen suspect
 
-Letters: redundancy.py and initial_errors.py. `mon.exceeded` (N_TESTS,): which tests have exceeded their
-bounds since the alarm; alarm: number of the test that raised it.
+Letters: redundancy.py and initial_errors.py; h is a hypothesis. `mon.exceeded` (N_TESTS,): which tests have
+exceeded their bounds since the alarm; alarm: number of the test that raised it.
 """
 
 import numpy as np

@@ -39,7 +39,7 @@ YAW_PLANE = (YAW, SIDE_FORCE)
 class ParityDirection(NamedTuple):
     """A parity direction as it is set up.
 
-    nulled: the index of the surface to whose column of G the direction is orthogonal (`across_surface`);
+    nulled: the index of the surface to whose column of G the direction is orthogonal;
     VANE_VIEW + i if it is orthogonal to the effect of an error of the vane of force i, SIDE_INDEX or
     NORMAL_INDEX (`across_vane`); AXIS_VIEW if it is one row by itself (`is_axis`).
     rows: the rows on which the direction is 1 at the start (ROLL, PITCH, YAW, SIDE_FORCE, NORMAL_FORCE). The

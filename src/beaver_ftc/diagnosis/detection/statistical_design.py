@@ -90,8 +90,9 @@ def hypotheses_by_block(aircraft: Aircraft) -> Iterator[tuple[tuple[int, ...], l
 
 
 def count_tests(aircraft: Aircraft, *directions: ParityDirection) -> int:
-    """The number of one-sided tests that the detector makes in a frame, those of these views included: one
-    for each onset and sign of a hypothesis that can raise the alarm, and one for each frequency of a view.
+    """The largest number of one-sided tests by which the detector may raise the alarm in a frame, those of
+    these views included: one for each onset and sign of a hypothesis that can raise the alarm, and one for
+    each frequency of a view.
 
     A view of a force across a surface tests for a step, losses and frequencies; the view of an axis of the
     rates, for frequencies. Other views raise no alarm (parity.py).

@@ -37,16 +37,16 @@ a sensor by the effect that its error would have from now on. Their limit is B_m
 the E at the alarm.
 
 What each effect follows from (v m/s: velocity, V its length; a m/s2: acceleration, gravity g included; both
-in body axes; p, q, r rad/s):
+in body axes; p, q, r rad/s; tests without their _TEST):
 
     attitude     with phi off, (q, r) is turned about the body's first axis; with theta off, the vertical
                  unit vector, about which the aircraft turns at psi'
     gravity      with phi off, its part g cos(theta) across the body's first axis is turned; with theta off,
-                 all of it; both in a, and so in SPEED, ALPHA_FLOW and BETA_FLOW
+                 all of it; both in a, and so in SPEED, ALPHA and BETA
     SPEED        V' = a . v / V
-    ALPHA_FLOW   alpha' = q - tan(beta) (p cos(alpha) + r sin(alpha))
+    ALPHA        alpha' = q - tan(beta) (p cos(alpha) + r sin(alpha))
                           + (a_z cos(alpha) - a_x sin(alpha)) / (V cos(beta))
-    BETA_FLOW    beta' = p sin(alpha) - r cos(alpha)
+    BETA         beta' = p sin(alpha) - r cos(alpha)
                          + (a_y cos(beta) - (a_x cos(alpha) + a_z sin(alpha)) sin(beta)) / V
     DENSITY      log(density) = log(2 qdyn) - 2 log V: log V changes by (1 + x) times what its reading shows,
                  if the error of the airspeed is a constant in m/s
@@ -285,7 +285,7 @@ def fill_flow_effects(mon, y, rate, dt2, a_max):
     """Fill H and C of the tests of flow, rad; sec_max: 1 / cos(beta_max), beta_max the largest |beta| if beta
     is off. In the code: acc: `in_plane` of a; side: exp(i beta), and sb its |sin|; secs: sec sec_max.
 
-                 ALPHA_FLOW                                BETA_FLOW
+                 ALPHA                                     BETA
         V        sec A_V                                   sec A_V
         alpha    sec (A_V + dt2 |rate| |sin(beta)|)        dt2 |rate| + A_V |sin(beta)|
         beta     sec sec_max (dt2 |rate.real| + A_V)       A_V

@@ -182,7 +182,7 @@ def predict_readings(mon):
     flow = past[I_AIRSPEED] * unit(past[I_BETA])
     plane = flow.real * unit(past[I_ALPHA])
     v = complex(0.0, plane.real), complex(flow.imag, plane.imag)
-    climb = times(v, down(past))[0].real  # minus the product of two vectors is their scalar product
+    climb = times(v, down(past))[0].real  # the real part of v d is -(v . d): upwards
     y[ALTITUDE] = past[ALTITUDE] + h * climb
     a = combined(AB_NOW, mon.a, -AB_PAST, mon.a_past)
     mon.a_size_past = length(mon.a_past)

@@ -28,7 +28,7 @@ def configure_gust(gust: np.void, declared: Declared) -> None:
     """
     air = declared.air
     aircraft = declared.aircraft
-    span = declared.aircraft.geometry.span_m
+    span = aircraft.geometry.span_m
     output = gust["output"]
     memory = gust["memory"]
     altitude = declared.sensors["altitude"]

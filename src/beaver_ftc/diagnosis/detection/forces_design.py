@@ -184,7 +184,7 @@ def _force_coefficient(declared: Declared, name: str, state: TrimState) -> float
     """The force coefficient `name` at x (3,) rad/s, y, u rad."""
     x, y, u = state
     aircraft = declared.aircraft
-    geometry = declared.aircraft.geometry
+    geometry = aircraft.geometry
     V = y[AIRSPEED]
     rates = x * (geometry.span_m / (2.0 * V), geometry.chord_m / V, geometry.span_m / (2.0 * V))
     names = (*aircraft.surfaces, *aircraft.signals, "alpha", "beta", "ph", "qh", "rh", SIDESLIP_RATE)

@@ -39,7 +39,7 @@ def fly_both() -> dict[tuple[str, str], Flown]:
 
 
 def healthy_settings() -> list[tuple[str, Changed]]:
-    """(whose, setting) for each corner and edge of the published uncertainty."""
+    """(whose, setting) for each of EDGES."""
     return [
         (whose, Changed(corner.name, {**changes, **corner.changes}))
         for whose, changes in WHOSE.items()
@@ -89,7 +89,8 @@ def _row(case: str, whose: str, flight: Flown) -> Document:
 
 
 def _better(rows: Sequence[Document]) -> list[Document]:
-    """The numbers that are better with the scheme and law of the paper."""
+    """The numbers that are better with the scheme and law of the paper, unless this flight loses the
+    aircraft."""
     # `fly_both` has each case with the paper's scheme first, then with ours
     pairs = zip(rows[::2], rows[1::2], strict=True)
     return [

@@ -4,8 +4,8 @@
     setting   a change for all cases: a choice that the paper leaves open, another condition, another gain
     flown     a case in a setting, with its log and measures
 
-Each choice that the paper leaves open is changed, one at a time, and all statements are tested again, to show
-whether the conclusions depend on the choices.
+Choices that the paper leaves open are changed, one in each setting, and all statements are tested again, to
+show whether the conclusions depend on the choices.
 """
 
 from collections.abc import Mapping
@@ -32,7 +32,7 @@ ESTIMATORS = ("aileron", "elevator", "rudder")
 AXIS = {"aileron": "p", "elevator": "q", "rudder": "r", "unanticipated": "q"}  # axis of the effect of a fault
 PUBLISHED_LOSS = 0.4  # share of the effectiveness
 AFTER_S = 18.0  # time that is flown after the fault
-SETTLED_S = 2.0  # from the start or a fault to steady tracking: four time constants of the error
+SETTLED_S = 2.0  # from the start or a fault to steady tracking: both poles of the error are at -1 1/s
 
 
 Changes = Mapping[str, Any]
@@ -65,12 +65,12 @@ AIRSPEEDS_MPS = (32.0, 36.0, 40.0, 43.0, 47.0, 54.0)
 SIZES = (0.1, 0.2, 0.6, 0.8, 1.0)  # share of the effectiveness that a published loss takes
 INSTANTS_S = (10.75, 13.0, 14.5)  # begins of the fault, at different phases of the references
 SIZE, AT = "published loss", "instant of the fault"  # keys of a setting that change the faults of a case
-EDGES = tuple(
+EDGES = tuple(  # every combination of the ends and the centre of the published range on the axes
     Changed("theta " + ", ".join(f"{theta:+g}" for theta in corner),
             {"uncertainty.inertia_coupling": dict(zip(AXES, corner, strict=True))})
     for corner in product((-0.25, 0.0, 0.25), repeat=3)
 )  # fmt: skip
-CORNERS = tuple(  # the corners of the uncertainty, and no uncertainty
+CORNERS = tuple(  # all axes at an end of the range, or all at 0
     edge
     for edge in EDGES
     if set(map(abs, edge.changes["uncertainty.inertia_coupling"].values())) in ({0.25}, {0.0})
@@ -98,7 +98,7 @@ class Flown:
 
     @property
     def struck(self) -> str:
-        """The surface with the fault; `unanticipated` for a fault without a surface."""
+        """The surface with the first fault; `unanticipated` for a fault without a surface."""
         return place_of(self.scenario.faults[0])
 
     @property
@@ -131,7 +131,8 @@ class Flown:
         return np.degrees(self.log[f"{axis}_model_rad_s"] - self.log[f"{axis}_rad_s"])
 
     def rms_deg_s(self, axis: str, start_s: float, end_s: float = np.inf) -> float:
-        """RMS tracking error of an axis from start_s to end_s, deg/s; infinite where the flight is over."""
+        """RMS tracking error of an axis from start_s to end_s, deg/s; infinite if the flight has no frame in
+        this span."""
         error = self.error_deg_s(axis)[self.between(start_s, end_s)]
         return float(np.sqrt(np.mean(error**2))) if error.size else np.inf
 
@@ -144,11 +145,11 @@ class Flown:
         return float(self.log["t_s"][np.argmax(holds)]) if holds.any() else np.inf
 
     def first_beyond_s(self, shares: np.ndarray) -> float:
-        """The first instant at which any of these shares (3, frames) exceeds 1, s."""
+        """The first instant at which any of these shares (3, frames) exceeds 1, s; infinite if none does."""
         return self.first_s(shares.max(axis=0) > 1.0)
 
     def between(self, start_s: float, end_s: float = np.inf) -> np.ndarray:
-        """Whether each frame lies in a span of time, (frames,)."""
+        """Whether each frame lies in a span of time, (frames,): start_s <= t < end_s."""
         return (self.log["t_s"] >= start_s) & (self.log["t_s"] < end_s)
 
     def excluded_at_s(self, estimator: str) -> float:
@@ -163,7 +164,7 @@ class Flown:
 
     def shares_of(self, estimator: str) -> np.ndarray:
         """|residual| / threshold on the side of the residual, of an isolation estimator, (3, frames); 0 / 0
-        is 0, and all are 0 if the scheme has no such estimator."""
+        is 0. All are 0 before the estimator works, and if the scheme has no such estimator."""
         residual, lower, upper = (
             np.array([self.log[f"fie_{estimator}_{axis}_{signal}_rad_s"] for axis in AXES])
             for signal in ("residual", "lower", "upper")
@@ -187,7 +188,8 @@ class Flown:
         return np.nan_to_num(residuals) * self.has(estimator)
 
     def unexplained_rad_s2(self, axis: str) -> np.ndarray:
-        """Acceleration over each frame less that of the design model, (frames,) rad/s2."""
+        """Acceleration over the frame that ends in each row, less that of the design model, (frames,) rad/s2.
+        Row 0 has no frame before it: its acceleration counts as 0."""
         rate = self.log[f"{axis}_rad_s"]
         return np.diff(rate, prepend=rate[0]) / self.frame_s - self.log[f"{axis}_design_rad_s2"]
 
@@ -210,7 +212,7 @@ def keys_of(case: Changed, changes: Changes) -> Document:
     A setting that changes the begin of the fault also changes the duration, so that AFTER_S are flown after
     it.
     """
-    merged = _apt({**case.changes, **changes})
+    merged = _without_unused({**case.changes, **changes})
     size = merged.pop(SIZE, PUBLISHED_LOSS)
     at_s = merged.pop(AT, FAULT_AT_S)
     faults = [fault | _struck(fault, size, at_s) for fault in merged.get("faults", [])]
@@ -249,7 +251,7 @@ class LazyFlights(dict[str, Flown]):
         return self._flown[key]
 
 
-def _apt(changes: Changes) -> Document:
+def _without_unused(changes: Changes) -> Document:
     """The changes, without options of the published scheme or law if the changes select another one."""
     unused = [
         f"{options}."

@@ -9,8 +9,8 @@ from beaver_ftc.documents.validation import parse_key, with_values
 from beaver_ftc.plugins import DETECTORS, LAWS, options_of
 from beaver_ftc.scenario.schema import Scenario
 
-FAULT_AT_S = 12.0
-AMPLITUDE_DEG_S = 3.0
+FAULT_AT_S = 12.0  # begin of the fault in each published case; cases.yaml repeats it
+AMPLITUDE_DEG_S = 3.0  # of each sine of the references
 ABLATION = "ablation"  # `origin` of an option that removes a part of the scheme
 
 # Given in section VII: the sinusoids of eta, the bound on the uncertainty, scheme and law.
@@ -68,7 +68,7 @@ CHOICES = (
 )
 
 
-# Options of scheme and law that are no gains, with their defaults.
+# The option that is no gain, because its default is 0, but that the paper leaves open.
 OPTIONS = (
     Choice(
         "fdi.options.initial_theta",
@@ -91,7 +91,7 @@ class Gain(NamedTuple):
 
 
 def gains() -> list[Gain]:
-    """The gains, from the tables of options of scheme and law, without options that remove a part or are
+    """The gains: the options of scheme and law, without those that remove a part and those with the default
     0."""
     tables = (
         ("fdi.options", options_of(DETECTORS, GIVEN["fdi.scheme"])),

@@ -3,6 +3,7 @@
     holds            the number keeps its limit
     ablation         the same flights without the mechanism to which the statement refers
     borne out        the statement holds, and does not hold in its ablation
+    not borne out    the number does not keep its limit
     stronger         it is also borne out in each setting that the paper did not fly
     cannot be judged it holds also in its ablation, or there is nothing to measure
 
@@ -96,8 +97,8 @@ class Claim(NamedTuple):
 
     def verdict(self, number: float, without: float, elsewhere: Sequence[tuple[float, float]]) -> str:
         """One of VERDICTS. number: in the published setting. without: in its ablation. elsewhere: both
-        numbers in each setting that the paper did not fly (ELSEWHERE of reproduction.py). A statement that is
-        true by construction must only hold there."""
+        numbers in each setting that the paper did not fly (ELSEWHERE of reproduction.py); empty for a claim
+        with `because`. A statement that is true by construction must only hold there."""
         if not self.holds(number):
             return NOT_BORNE_OUT
         if self.holds(without):

@@ -45,12 +45,12 @@ def _ratio(error: float, other: float) -> float:
 
 
 def detection(flight: Flown) -> float:
-    """Time from the fault to the alarm, s."""
+    """Time from the fault to the alarm, s; infinite without an alarm after the fault."""
     return or_never(flight.metrics.detection.delay_s)
 
 
 def detected(*flights: Flown) -> float:
-    """Number of faults that raise an alarm."""
+    """Number of faults that are detected, without a false alarm before them."""
     return sum(map(np.isfinite, map(detection, flights)))
 
 
@@ -70,8 +70,8 @@ def handled(*flights: Flown) -> float:
 
 
 def order(*flights: Flown) -> float:
-    """The smallest number of frames from fault to detection, and from detection to isolation; 0 if one never
-    happens."""
+    """The smallest of the numbers of frames from fault to detection and from detection to isolation, over all
+    flights; 0 if one never happens."""
     steps = [step(flight) for flight in flights for step in (detection, isolation)]
     return _frames(flights[0], min(steps)) if np.isfinite(steps).all() else 0.0
 
@@ -151,13 +151,13 @@ def generalised(*flights: Flown) -> float:
 
 
 def named(flight: Flown) -> float:
-    """Time with exactly one estimator not excluded, s. In a flight with an unknown fault, this is a wrong
-    name."""
+    """Time after the alarm with exactly one estimator not excluded, s. In a flight with an unknown fault,
+    this is a wrong name."""
     return round(sum(map(flight.named_s, ESTIMATORS)), 9)
 
 
 def left(flight: Flown) -> float:
-    """Number of isolation estimators that are not excluded."""
+    """Number of ESTIMATORS that are never excluded. One that the scheme does not have counts, too."""
     return sum(not np.isfinite(flight.excluded_at_s(estimator)) for estimator in ESTIMATORS)
 
 
@@ -235,8 +235,8 @@ def outside(*flights: Flown) -> float:
 
 
 def unbounded(flight: Flown) -> float:
-    """1e6 (max |error| / bound - 1): excess of the model error before the fault over the bound of the paper,
-    ppm; negative if the error stays within.
+    """1e6 (max |error| / bound - 1): excess of the model error from SETTLED_S to the fault over the bound of
+    the paper, ppm; negative if the error stays within.
 
     The logged eta_bar is the bound of the paper plus `added`, rad/s2, for the rotation W of the Earth and
     rounding: W (2 sum |rates| + W) + ROUNDING, as bounds.add_published_bound adds it with kappa = 1 for the
@@ -290,8 +290,8 @@ def deterioration(flight: Flown) -> float:
 
 def _beside(flights: tuple[Flown, ...], after_s: float) -> float:
     """RMS error from after_s after the fault on, over that of another law; the largest of several faults,
-    each on the axis of its effect. flights: those with our law, then those with the other law, in the same
-    order of faults."""
+    each on the axis of its effect. Ours is infinite if the aircraft is lost; that of the other law ends at a
+    loss. flights: those with our law, then those with the other law, in the same order of faults."""
     half = len(flights) // 2
     ratios = []
     for ours, other in zip(flights[:half], flights[half:], strict=True):

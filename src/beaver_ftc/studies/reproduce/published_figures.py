@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SENSITIVITY = "sensitivity"
-_LEAST, _MOST = 1e-3, 10.0  # ends of the axis of this figure; ratios beyond are drawn at the ends as arrows
+_LEAST, _MOST = 1e-3, 10.0  # ends of the axis; a published ratio beyond is drawn at the end as an arrow
 # Verdicts in the order of the rows from above. Testable statements that cannot be judged hold in their
 # ablation.
 _GROUPS = (NOT_BORNE_OUT, CANNOT_BE_JUDGED, BORNE_OUT, STRONGER)
@@ -113,7 +113,7 @@ def shares(claim: Document) -> tuple[float, float, float]:
 
 def _share(claim: Document, number: float | None) -> float:
     """number / limit, or limit / number if the number is to be at least the limit: 1 or less keeps the limit.
-    0 / 0 is 0. A number that is None never comes, and counts as infinite."""
+    0 / 0 is 0, a larger number / 0 infinite. A number that is None never comes, and counts as infinite."""
     size = or_never(number)
     limit = claim["limit"]
     numerator, denominator = (limit, size) if claim["at_least"] else (size, limit)
@@ -123,8 +123,8 @@ def _share(claim: Document, number: float | None) -> float:
 
 
 def margins_figure(document: Document) -> "Figure":
-    """A row for each testable statement, ordered by verdict: the range of its ratio over all settings, and
-    the ratio in the published setting."""
+    """A row for each testable statement, ordered by verdict: the range of its ratio over all settings in
+    which it is flown, and the ratio in the published setting."""
     from matplotlib.figure import Figure
 
     claims = [claim for claim in document["claims"] if not claim["reason"] and not claim["construction"]]

@@ -70,7 +70,8 @@ def claims_row(setting: Changed) -> Document:
 
         numbers    the number of each of MEASURED
         without    the number of each in its ablation
-        same       in how many flights of FAULTY adaptation changes neither alarm nor name nor their times
+        same       in how many flights of FAULTY the adaptation of the isolation estimators changes neither
+                   the name nor the times of alarm and name
 
     A number that no verdict needs is not flown. It is nan, which keeps no limit.
     """
@@ -81,14 +82,14 @@ def claims_row(setting: Changed) -> Document:
     def without(claim: Claim) -> float:
         return claim.number(LazyFlights({**setting.changes, **WITHOUT[claim.ablation].changes}, flown_so_far))
 
-    rigid = LazyFlights({**setting.changes, **NO_ADAPTATION}, flown_so_far)
+    unadapted = LazyFlights({**setting.changes, **NO_ADAPTATION}, flown_so_far)
     return {
         NUMBERS: [claim.number(flights) if is_published or not claim.because else nan for claim in MEASURED],
         ABLATED: [
             without(claim) if is_published or (claim.testable and not claim.because) else nan
             for claim in MEASURED
         ],
-        SAME: sum(_verdict_in(flights[name]) == _verdict_in(rigid[name]) for name in FAULTY),
+        SAME: sum(_verdict_in(flights[name]) == _verdict_in(unadapted[name]) for name in FAULTY),
     }
 
 
@@ -160,7 +161,8 @@ def _claims(pairs_of: BySetting) -> Rows:
 
 
 def _judged(claim: Claim, by_setting: Mapping[str, tuple[float, float]]) -> Document:
-    """The row of a measured claim. by_setting: its pair of numbers by name of the setting."""
+    """The row of a measured claim. by_setting: its pair of numbers by name of the setting. `lowest` and
+    `highest` are over ELSEWHERE; a claim with `because` has only its number in the published setting."""
     number, without = by_setting[AS_PUBLISHED.name]
     elsewhere = [] if claim.because else [by_setting[setting.name] for setting in ELSEWHERE]
     measure, verdict = claim.measure, claim.verdict(number, without, elsewhere)
@@ -242,7 +244,7 @@ def _gains(pairs_of: BySetting) -> Rows:
 
 def _sensitivity(pairs_of: BySetting) -> Rows:
     """A row for each setting of ELSEWHERE: the claims that no longer hold, and those that hold in their
-    ablation, too."""
+    ablation only there."""
     return [
         {
             "variant": setting.name,

@@ -29,8 +29,8 @@ _GOOD = {ELSEWHERE_TOO: True, BORNE_OUT: True, NOT_BORNE_OUT: False}
 
 
 def number(value: float | None, unit: str = "", none: str = "never") -> str:
-    """A number with three digits and its unit. A number whose unit begins with `of ` is a share, and in per
-    cent."""
+    """A number with its unit. One whose unit begins with `of ` is a share: in per cent with one decimal, all
+    others with three digits. None is `none`."""
     if value is not None and unit.startswith("of "):
         return f"{100 * value:.1f} % {unit}"
     return tables.number(value, unit, none=none)
@@ -79,13 +79,13 @@ def verdict_words(claim: Document) -> str:
 
 
 def remark(claim: Document) -> str:
-    """The reason of a verdict, unless it is obvious; and whether a statement is true by construction."""
+    """Whether a statement is true by construction, and what `_remark` says."""
     construction = ["true by the construction of the code"] if claim["construction"] else []
     return "; ".join([*construction, *filter(None, [_remark(claim)])])
 
 
 def _remark(claim: Document) -> str:
-    """The reason of a verdict, or an empty text."""
+    """In how many other settings a statement is borne out, or the reason of another verdict; may be empty."""
     if claim["verdict"] == BORNE_OUT and not claim["construction"]:
         return "in {borne_out_in} of {elsewhere} settings that the paper did not fly".format(**claim)
     return "holds without it as well" if claim["verdict"] == CANNOT_BE_JUDGED else claim["because"]
@@ -97,8 +97,8 @@ def measured(document: Document) -> list[Document]:
 
 
 def exceptions(document: Document) -> list[str]:
-    """A sentence for each statement and setting in which it does not hold, or also holds without its
-    mechanism."""
+    """A sentence for each statement and setting in which, unlike in the published one, it does not hold, or
+    also holds without its mechanism."""
     return [
         sentence
         for row in document["sensitivity"]
@@ -141,7 +141,7 @@ ABLATIONS = (
     ("Taken out", "takes"), ("By", "changes", _changes), ("Statements that speak of it", "statements"),
     ("Fail without it", "fail"),
 )  # fmt: skip
-RANGES = (  # columns of a measured statement: the range of its number over all settings
+RANGES = (  # columns of a measured statement: `lowest` and `highest` of its row
     ("Published", "where"), ("Statement", "statement"), ("From", partial(_number_text, key="lowest")),
     ("To", partial(_number_text, key="highest")), ("Held", "{held_in} of {elsewhere}".format_map),
 )  # fmt: skip

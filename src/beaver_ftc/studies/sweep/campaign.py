@@ -85,8 +85,9 @@ def run_sweep(
     progress: called with the numbers of flights: `total` of the sweep, and so far `done`, `failed` (without
     metrics), `faulted`, and `detected` of these. stopped: whether the user has stopped the sweep.
 
-    Raises BadInput for a folder that holds another or an unfinished sweep, SimulationFailed where the folder
-    cannot be written or no flight could be flown, SweepStopped once `stopped` is true.
+    Raises BadInput for a folder from which this sweep may not begin or go on (`Store.begin`),
+    SimulationFailed where the folder cannot be written or no flight could be flown, SweepStopped if `stopped`
+    is true before all flights are flown.
     """
     sweep = named_for(sweep, options.search)
     so_far = Counter(total=sweep.flights)
@@ -152,8 +153,9 @@ def _workers(sweep: Sweep, options: Options, flights: int) -> Workers:
 
 
 def conclude(sweep: Sweep, options: Options, store: Store) -> Document:
-    """Write the results of a complete `results.parquet`: kept flights, figures and report; `summary.json`
-    last, since it marks a finished sweep."""
+    """Write the results of a complete `results.parquet`: the worst flights if they are to be kept, figures
+    and report; `summary.json` last, since it marks a finished sweep. Raises SimulationFailed if no flight
+    could be flown."""
     from beaver_ftc.studies.sweep.outcomes import Flights
 
     flights = Flights(store.results, sweep)

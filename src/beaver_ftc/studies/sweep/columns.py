@@ -36,7 +36,7 @@ def _value_of_pair(path: str, end: int, metrics: Metrics) -> float | None:
 
 
 def _faults(metrics: Metrics) -> str:
-    """`surface:type` of each named fault, if several are named at once."""
+    """`surface:type` of each named fault, if several are named at once; `surface:open` without a type."""
     named = (fault for fault in metrics.isolation.faults if fault.fault)
     return " ".join(f"{fault.fault}:{fault.type or 'open'}" for fault in named)
 
@@ -134,5 +134,6 @@ def _kind(path: str) -> str:
 
 
 def getter_of(name: str) -> Getter:
-    """The function that reads a column from the metrics. It returns None if a section on the way is None."""
+    """The function that reads a column from the metrics. That of a path returns None if a section on the way
+    is None."""
     return _GETTERS.get(name) or (lambda metrics: metrics.at(name))

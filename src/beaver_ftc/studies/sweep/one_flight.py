@@ -54,7 +54,7 @@ def kind_of(variation: Variation) -> str:
 
 
 def as_cell(value: Any, kind: str) -> Any:
-    """A varied value as a cell of its column."""
+    """A varied value as a cell of its column; in a column of text, JSON of a value that is no text."""
     if kind == "float":
         return float(value)
     return value if kind == "flag" or isinstance(value, str) else json.dumps(value)
@@ -123,7 +123,8 @@ class Keep:
     """Which flights get a result folder of their own.
 
     - policy: one of KEEP_POLICIES. `failed`: flights that are lost, failed or do not meet expectations.
-      `missed`: also those with a missed fault or a wrong name. runs: further flights.
+      `missed`: also those with a missed fault or a wrong name. `worst`: none yet, see `campaign.conclude`.
+    - runs: numbers of further flights.
     - folder: of the result folders. certified: whether certificates are written.
     """
 
@@ -192,7 +193,8 @@ def warm_up(sweep: Sweep) -> None:
 
 
 def keep_flight(sweep: Sweep, assignment: Assignment, keep: Keep, report: bool = False) -> None:
-    """Fly one flight as `run` does, into a result folder of its own. If it fails, keep its scenario."""
+    """Fly one flight as `run` does, into a result folder of its own. If it fails, keep its scenario, if it
+    has one."""
     from beaver_ftc.results.folder import result_folder
     from beaver_ftc.results.writer import NotAllWritten, run
     from beaver_ftc.scenario.builtin import to_yaml

@@ -54,7 +54,7 @@ class Flights:
 
     @cached_property
     def faulted(self) -> np.ndarray:
-        """Flights with a fault and without an alarm before it, in which the fault can be detected."""
+        """Flights with metrics whose first fault begins before the end, without an alarm before it."""
         has_fault = strikes_within(self["fault.at_s"], self["flown_s"])
         return self.measured & has_fault & ~self["false_alarm"]
 
@@ -79,8 +79,8 @@ class Flights:
         return np.where(self.isolated, self["isolation.delay_s"], np.inf)
 
     def post_fault_rms_deg_s(self, axis: str) -> np.ndarray:
-        """RMS tracking error after the fault, deg/s; infinite if the aircraft was lost, NaN without a
-        fault."""
+        """RMS tracking error after the fault, deg/s; infinite in a faulted flight that lost the aircraft, NaN
+        without a fault."""
         rms = self[f"tracking.post_fault_rms_deg_s.{axis}"]
         return np.where(self.departed & self.faulted, np.inf, rms)
 
@@ -93,12 +93,13 @@ class Flights:
 
     @cached_property
     def worst_rms_deg_s(self) -> np.ndarray:
-        """The largest RMS tracking error of the three axes after the fault, deg/s."""
+        """The largest RMS tracking error of the three axes after the fault, deg/s; NaN without a fault."""
         return np.max([self.post_fault_rms_deg_s(axis) for axis in AXES], axis=0)
 
     @cached_property
     def fault_labels(self) -> np.ndarray:
-        """The fault of each flight in words: the surface, with the type if the sweep has several types."""
+        """The first fault of each flight in words: the surface, with the type if the sweep has several types;
+        the type of a fault without a surface."""
         kinds = self["fault.type"]
         actuators = self["fault.actuator"]
         several = len(set(kinds[kinds != ""])) > 1
@@ -111,7 +112,7 @@ class Flights:
 
 
 def _array(column) -> np.ndarray:
-    """A column of a table as an array without nulls."""
+    """A column of a table as an array, its nulls as `Flights` says."""
     import pyarrow as pa
 
     if pa.types.is_boolean(column.type):

@@ -34,8 +34,8 @@ if TYPE_CHECKING:
 
 Drawer = Callable[[Flights, Document], "Figure | None"]
 
-BINS = 16  # at most
-LEAST_A_BIN = 10  # flights
+BINS = 16  # most bins of a curve
+LEAST_A_BIN = 10  # flights in a bin, unless the curve has fewer
 _SEARCHED = {  # label of the score, by objective of the search
     "delay": "detection delay (s)",
     "false_alarm": "residual / threshold without a fault",
@@ -88,8 +88,9 @@ def _log_of_numbers(axes: "Axes") -> None:
 
 
 def magnitude_key(flights: Flights, summary: Document) -> str | None:
-    """The varied key that stands for the size of the fault: the number of a fault, else any number, that
-    explains the detection delay best. None if no number varies."""
+    """The varied key that stands for the size of the fault: the number of a fault other than its times, else
+    any number, that explains the detection delay best; the first one without a ranking. None if no number
+    varies."""
     ranked = [entry["key"] for entry in summary["sensitivity"]["detection_delay"]]
     numbers = [key for key in (ranked or flights.vary) if flights.is_number(key)]
     of_faults = [key for key in numbers if key.startswith("faults[") and not key.endswith(("at_s", "end_s"))]
@@ -133,15 +134,15 @@ def _levels(values: np.ndarray) -> list[np.ndarray]:
 
 
 def _bins(values: np.ndarray) -> list[np.ndarray]:
-    """Indices of the values in bins with equal numbers of values, in their order, at least LEAST_A_BIN in
-    each."""
+    """Indices of the values in at most BINS bins with equal numbers of values, in their order, at least
+    LEAST_A_BIN in each."""
     count = min(BINS, max(1, values.size // LEAST_A_BIN))
     return np.array_split(np.argsort(values, kind="stable"), count)
 
 
 def delay_distribution(flights: Flights, summary: Document) -> "Figure | None":
-    """Share of faults detected within a time, a curve for each fault. The distance of its end from 1 is the
-    share of missed faults."""
+    """Share of faults detected within a time, a curve for each fault that is ever detected. The distance of
+    its end from 1 is the share of missed faults."""
     if not flights.detected.any():
         return None
     figure, axes = _axes("", "detection delay (s)", "share of faults detected within the delay")
@@ -194,7 +195,7 @@ def _shaded(
 
 
 def sensitivity(flights: Flights, summary: Document) -> "Figure | None":
-    """The share of each outcome that each varied key explains."""
+    """The share of each outcome that the keys explain: the first 12 of the ranking of the first outcome."""
     rankings = {name: ranking for name, ranking in summary["sensitivity"].items() if ranking}
     if not rankings:
         return None

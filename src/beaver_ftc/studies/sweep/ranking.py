@@ -10,8 +10,8 @@ import numpy as np
 
 from beaver_ftc.documents.files import Document
 
-BINS = 8  # groups of a key with more values
-MOST_FLIGHTS = 4000  # of more flights, about so many, evenly spaced, are enough for a ranking
+BINS = 8  # groups of a number with more values
+MOST_FLIGHTS = 4000  # of more flights, every n-th one is used, at most so many: enough for a ranking
 PERMUTATIONS = 199
 
 Ranking = list[Document]
@@ -22,7 +22,7 @@ def rank(keys: dict[str, np.ndarray], outcome: np.ndarray) -> Ranking:
 
     keys: by name, values (n,), numbers or texts. outcome (n,), which may be infinite. An entry has `key`,
     `explained` (share of the variance of ranks), `rank_correlation` (Spearman's, null for texts) and
-    `p_value`.
+    `p_value`. The list is empty for fewer than 2 BINS flights, and if all outcomes are equal.
     """
     chosen = np.arange(0, outcome.size, max(1, -(-outcome.size // MOST_FLIGHTS)))
     ranks = ranks_of(outcome[chosen])
@@ -63,7 +63,7 @@ def _groups(values: np.ndarray) -> np.ndarray:
 
 def _explained(groups: np.ndarray, ranks: np.ndarray) -> float:
     """1 - (SSW / (n - k)) / (SST / (n - 1)) of n ranks in k groups; SSW, SST: sums of squares within
-    the groups, and of all."""
+    the groups, and of all. 0 with one group, or with one rank in each."""
     counts = np.bincount(groups)
     used = counts > 0
     means = np.bincount(groups, ranks)[used] / counts[used]

@@ -64,7 +64,7 @@ def score_of(scenario: Scenario, expectation: str) -> float:
         no_departure             max |signal| / limit - 1, of all signals and frames
         no_false_alarm           max |residual| / threshold - 1
         a number                 |actual| / expected - 1, or |actual| if 0 is expected
-        the same, not reached    time from the fault to the end of the flight, s: the later, the worse
+        the same, not reached    time from the first fault, or else the start, to the end, s
 
     The score is then limited, below 0 if the expectation is met, else to 0 or more.
     """
@@ -161,7 +161,8 @@ class Event:
 def rare_study(sweep: Sweep, expectation: str, tell: Callable[[str], None] = lambda _: None) -> Study:
     """The probability that a sweep's flights do not meet an expectation of its base scenario.
 
-    tell: takes a line of progress after each round. Raises BadInput if the base does not expect this.
+    tell: takes a line of progress after each round. Raises BadInput if the base does not expect this, or if
+    no key varies.
     """
     check(sweep, expectation)
     event = Event(sweep, expectation)

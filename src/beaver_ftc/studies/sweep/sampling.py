@@ -24,10 +24,12 @@ MIN_U = 2.0**-53
 MAX_U = 1.0 - MIN_U
 
 # Random numbers of a sweep for different purposes have different spawn keys, which differ in a word or in
-# their length:     (index,)                    the seed of a flight     (index, OF_VALUES)          the
-# values of a flight     (0, OF_DESIGN)              the points of a Latin hypercube, or the scrambling of
-# Sobol points     (generation, 0, OF_SEARCH)  a generation of a search     (0, 0, OF_RARE)             subset
-# simulation
+# their length:
+#     (index,)                     the seed of a flight
+#     (index, OF_VALUES)           the values of a flight
+#     (0, OF_DESIGN)               the points of a Latin hypercube, or the scrambling of Sobol points
+#     (generation, 0, OF_SEARCH)   a generation of a search
+#     (0, 0, OF_RARE)              subset simulation
 OF_VALUES, OF_DESIGN = 1, 2
 OF_SEARCH, OF_RARE = 2, 3
 

@@ -46,8 +46,8 @@ def delay_score(row: Row) -> float:
 
 
 def tracking_score(row: Row) -> float:
-    """Largest RMS tracking error after the fault, deg/s. A loss of the aircraft has a larger score, the
-    earlier it is."""
+    """Largest RMS tracking error after the fault, deg/s; minus infinity without a fault. A loss of the
+    aircraft has a score above all errors, the larger the earlier it is."""
     if row["status"] == DEPARTED:
         return DEPARTED_DEG_S - row["flown_s"]
     rms_deg_s = [row[f"tracking.post_fault_rms_deg_s.{axis}"] for axis in AXES]
@@ -56,7 +56,7 @@ def tracking_score(row: Row) -> float:
 
 OBJECTIVES: dict[str, Callable[[Row], float]] = {
     "delay": delay_score,
-    "false_alarm": itemgetter("worst_residual_ratio"),  # 1 is a false alarm
+    "false_alarm": itemgetter("worst_residual_ratio"),  # above 1: a false alarm
     "tracking": tracking_score,
 }
 
@@ -120,7 +120,8 @@ class Evolution:
 
 
 def generations(sweep: Sweep, objective: str, store: Store) -> Iterator[Round]:
-    """The rounds of the generations. The next one is made when the one before has landed in the store."""
+    """The rounds of the generations. The next one is made when the one before has landed in the store; there
+    is none if it has not. Raises BadInput if no key varies."""
     if not sweep.keys:
         raise BadInput(f"{sweep.name}: vary: nothing varies, allowed in a search: at least one key")
     evolution = Evolution(sweep.file.seed, len(sweep.keys))
@@ -140,7 +141,8 @@ def _flights_of(values: Mapping[int, Document], runs: Sequence[int]) -> list[Ass
 
 
 def search_result(objective: str, results: Path, sweep: Sweep) -> Document:
-    """The result of the search: the worst flight, and the worst score so far after each generation."""
+    """The result of the search: the worst flight with its values, and the worst score so far after each
+    generation."""
     from pyarrow.parquet import read_table
 
     rows = read_table(results).to_pylist()

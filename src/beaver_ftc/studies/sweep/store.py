@@ -1,7 +1,7 @@
 """The folder of a sweep.
 
 sweep.json         the identity: a folder with it belongs to a sweep
-parts/             a table for each batch, as long as the sweep is not compacted
+parts/             a table for each batch, until all flights are in results.parquet
 results.parquet    the table of all flights, compacted from the parts
 summary.json       the summary: a folder with it has a finished sweep
 figures/, flights/, report.html    drawn from the results, and kept flights
@@ -99,13 +99,15 @@ class Store:
     def begin(self, mine: Document, resume: bool) -> None:
         """Prepare the folder for this sweep. mine: its identity.
 
-            in the folder                          without --resume     with --resume
-            nothing                                begin                begin
-            flights, but no readable sweep.json    BadInput             set aside, begin
-            an unfinished sweep                    BadInput             continue if the identity is the same
-            a finished sweep                       remove, begin        continue if the identity is the same
+            in the folder                        without --resume     with --resume
+            nothing                              begin                begin
+            flights without sweep.json           BadInput             set aside, begin
+            sweep.json that cannot be read       BadInput             set aside, begin
+            a sweep without flights              remove, begin        continue if the identity is the same
+            a sweep with flights, unfinished     BadInput             continue if the identity is the same
+            a finished sweep, also another one   remove, begin        continue if the identity is the same
 
-        Raises BadInput, too, if the identity differs.
+        With --resume, another identity raises BadInput.
         """
         earlier = identity.read_identity(self._manifest, "sweep")
         has_flights = self.results.exists() or bool(self.parts)
@@ -151,7 +153,7 @@ class Store:
             return None
 
     def is_compacted(self, flights: int) -> bool:
-        """Whether `results.parquet` is there with all flights."""
+        """Whether `results.parquet` has all flights and the columns of the sweep."""
         from pyarrow import ArrowException
         from pyarrow.parquet import ParquetFile
 
@@ -189,7 +191,8 @@ class Store:
         """Remove the files of an earlier sweep; `sweep.json` last, since it marks the folder as that of a
         sweep.
 
-        Other files of the user stay. Raises SimulationFailed if the folder of a kept flight has such a file.
+        Files of the user in `figures` stay. Raises SimulationFailed if the folder of a kept flight has a file
+        that is no result.
         """
         from beaver_ftc.studies.sweep.pictures import FIGURES
 
@@ -208,7 +211,8 @@ class Store:
 
 
 def write_tables(file: IO[bytes], tables: Iterable["pa.Table"], schema: "pa.Schema") -> None:
-    """Write tables into a parquet file, in row groups of at least ROWS_PER_GROUP rows.
+    """Write tables into a parquet file, in row groups of at least ROWS_PER_GROUP rows; the last may have
+    fewer.
 
     Tables are joined as they come, so that only those of one row group are in memory.
     """

@@ -55,7 +55,7 @@ class Chains:
         self.design: tuple[float, int, np.ndarray] | None = None
 
     def go(self, fly: FlyPoints) -> None:
-        """Fly until every run has reached the event, or until a run is stuck."""
+        """Fly until every run has reached the event, until a run is stuck, or to level MOST_LEVELS."""
         self.scores[:] = self._flown(fly, self.points)
         self.plain = int((self.scores >= 0.0).sum()), self.scores.size
         while True:
@@ -68,7 +68,7 @@ class Chains:
 
     def _level(self, run: int) -> float:
         """The next level of a run: the score that the share SHARE of its flights reaches, at most 0.
-        Multiplies `share` by the share that reaches it."""
+        Multiplies `share` by the share that reaches it, and sets `reached` and `stuck`."""
         scores = self.scores[run]
         level = float(np.sort(scores)[-max(1, round(SHARE * scores.size))])
         if not math.isfinite(level):  # too few flights have a score
@@ -126,7 +126,7 @@ class Chains:
 
     def estimate(self) -> Document:
         """The result: the probability with its two-sided interval, and the numbers of flights. why: the
-        reason if the probability is not known; the interval then ends at the level that was reached."""
+        reason if the probability is not known; the interval then ends at the largest `share` of the runs."""
         events, trials = self.plain
         if self.reached.all():
             probability, low, high = lognormal_mean(self.share)
@@ -144,7 +144,8 @@ class Chains:
 
 
 def lognormal_mean(values: np.ndarray) -> tuple[float, float, float]:
-    """Mean of some lognormal values (n,) and its two-sided interval, Cox's with Student's t:
+    """Arithmetic mean of lognormal values (n,), and the two-sided interval of the mean, Cox's with Student's
+    t, at most 1:
 
     exp(m + s/2 -+ t sqrt(s/n + s^2 / (2 (n - 1)))),  m, s: mean and variance of the logarithms
     """

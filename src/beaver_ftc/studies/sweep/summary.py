@@ -83,8 +83,8 @@ def _estimate(name: str, estimate: Estimate) -> Document:
 
 
 def quantiles(values: np.ndarray) -> Document:
-    """QUANTILES of values (n,), and their number. An event that never came has an infinite value; an infinite
-    quantile is null."""
+    """QUANTILES of the values (n,) without NaN, and their number. An event that never came has an infinite
+    value; an infinite quantile is null."""
     ordered = _sorted_without_nan(values)
     return {"of": int(ordered.size), **{name: number(quantile(ordered, q)) for name, q in QUANTILES.items()}}
 
@@ -95,9 +95,8 @@ def _sorted_without_nan(values: np.ndarray) -> np.ndarray:
 
 
 def _reasons(flights: Flights) -> list[Document]:
-    """The reasons why flights have no metrics, the most frequent first. Reasons that differ only in numbers
-    are counted together, and have the text of their first flight.
-    """
+    """At most MOST_REASONS reasons why flights have no metrics, the most frequent first. Reasons that differ
+    only in numbers are counted together, and have the text of their first flight."""
     failed = np.flatnonzero(~flights.measured)
     kinds = [_NUMBERS.sub("#", reason) for reason in flights["reason"][failed]]
     first = dict(zip(reversed(kinds), reversed(failed.tolist()), strict=True))
@@ -132,7 +131,8 @@ def _isolation(flights: Flights, group: np.ndarray) -> Document:
 
 
 def _false_alarms(flights: Flights) -> Document:
-    """False alarms, and their rate per hour in which an alarm would have been false."""
+    """False alarms, their rate per hour in which an alarm would have been false, and the largest |residual| /
+    threshold in healthy flight."""
     count, hours = flights.false_alarms
     return {
         "count": count,
@@ -143,7 +143,7 @@ def _false_alarms(flights: Flights) -> Document:
 
 
 def _guarantee(flights: Flights) -> Document:
-    """In how many flights detection was guaranteed, and in how many of these it came later than
+    """In how many faulted flights detection was guaranteed, and in how many of these it came later than
     guaranteed."""
     promised = flights.faulted & np.isfinite(flights["detection.guaranteed_delay_s"])
     frame_s = flights["flown_s"] / flights["frames"]
@@ -184,7 +184,8 @@ def _confusion(flights: Flights) -> Document:
 
 
 def _tracking(flights: Flights, axis: str) -> Document:
-    """Quantiles of the tracking errors of an axis, deg/s, and of their ratio after and before the fault."""
+    """Quantiles of the tracking errors of an axis, deg/s, and of their ratio after and before the fault.
+    Those before the fault are of all measured flights, the others of the faulted ones."""
     group = flights.faulted
     return {
         "pre_fault_rms_deg_s": quantiles(flights[f"tracking.pre_fault_rms_deg_s.{axis}"][flights.measured]),
@@ -239,7 +240,7 @@ def _bounds(expect: SweepExpect) -> Iterator[tuple[str, Level, str]]:
 
 def _verdict(flights: Flights, name: str, level: Level, side: str) -> Document:
     """The evaluation of one limit. With a confidence, the one-sided bound of the estimate must keep the
-    limit: the upper bound for `at_most`, the lower one for `at_least`."""
+    limit: the upper bound for `at_most`, the lower one for `at_least`. A limit without flights is not met."""
     n_flights, value, bound = estimate_of(flights, name, level)
     limit = getattr(level, side)
     actual = value if level.confidence is None else bound(level.confidence, side == "at_most")

@@ -1,7 +1,7 @@
 """The summary of a sweep in words, for the terminal and the report.
 
-All words are computed from the summary document, so that they cannot disagree with `summary.json`. A function
-returns an empty text if there is nothing to say, and its line is left out.
+All words are computed from the summary document, so that they cannot disagree with `summary.json`. The
+function of a line in `facts` returns an empty text if there is nothing to say, and the line is left out.
 """
 
 from collections.abc import Mapping, Sequence
@@ -27,19 +27,20 @@ from beaver_ftc.studies.present.tables import Rows, number, tabulated
 from beaver_ftc.studies.sweep.pictures import FIGURES
 from beaver_ftc.studies.sweep.summary import OUTCOMES
 
-MANY = 0.1  # share of the flights from which on there is a warning
-# Limits of a key that is said to determine an outcome.
+MANY = 0.1  # share of the faulted flights from which on there is a warning
+# A key is named if, by itself, it has at most this p-value and explains at least this share of the ranks.
 MAX_P_VALUE = 0.05
 MIN_EXPLAINED = 0.01
 SHOWN = 3  # number of keys of an outcome, and of worst flights, for the terminal
 _STEERED = "The search steered these flights towards the worst: rates say nothing about flights in general."
-_EXPLAINED = (
+_SENSITIVITY_NOTE = (
     "Share of the ranks of an outcome that a varied key explains (Kruskal and Wallis' epsilon squared), "
     "Spearman's rank correlation, and how often chance alone explains as much."
 )
 value = partial(number, none="none")
 _seconds = partial(number, unit="s", none="never")
 _UNITS = {"delay": " s", "false_alarm": " of the threshold", "tracking": " deg/s"}
+_SIGNS = {"at_least": "≥", "at_most": "≤"}
 
 
 def title(summary: Document) -> str:
@@ -76,7 +77,7 @@ def facts(summary: Document) -> list[tuple[str, str]]:
 
 def tracking(summary: Document) -> list[tuple[str, str, str, str]]:
     """(name, p, q, r): medians of the tracking errors before and after the fault, deg/s, and of their
-    ratio."""
+    ratio, without rows that have no number."""
     rows = {"before the fault": "pre_fault_rms_deg_s", "after": "post_fault_rms_deg_s", "ratio": "ratio"}
     medians = {name: [summary["tracking"][a][key]["median"] for a in AXES] for name, key in rows.items()}
     return [
@@ -119,9 +120,6 @@ def expected(level: Document) -> str:
     return f"{quantile}{_SIGNS[side]} {value(level[side])}{confidence}"
 
 
-_SIGNS = {"at_least": "≥", "at_most": "≤"}
-
-
 def _side(level: Document) -> str:
     """The side of a limit, `at_least` or `at_most`: its key in the level."""
     return next(side for side in _SIGNS if side in level)
@@ -138,7 +136,7 @@ def exact_percent(share: float | None) -> str:
 
 
 def summary_text(summary: Document, colour: bool = False) -> str:
-    """The summary as a table for the terminal."""
+    """The summary as a table for the terminal, and the commands that fly the worst flights again."""
     # each command is on its own line, to be copied
     worst = [f" {'; '.join(flight['why'])}:\n   {flight['replay']}" for flight in summary["worst"][:SHOWN]]
     headline = (title(summary), "bold green" if summary["passed"] else "bold red")
@@ -162,7 +160,7 @@ def _flights(summary: Document) -> str:
 
 
 def _search(summary: Document) -> str:
-    """The objective of a search, and the worst score."""
+    """The objective of a search, the worst score and its flight."""
     search = summary.get("search")
     if search is None:
         return ""
@@ -186,7 +184,8 @@ def _quantiles(delays: Document) -> str:
 
 
 def _false_alarms(alarms: Document) -> str:
-    """The false alarms, their rate, and the largest residual without a fault."""
+    """The false alarms, their rate with its interval, and the largest |residual| / threshold in healthy
+    flight."""
     if not alarms["hours"]:
         return ""
     return (
@@ -197,7 +196,8 @@ def _false_alarms(alarms: Document) -> str:
 
 
 def _on_the_bound(rate: Document) -> str:
-    """A warning if the residual of the healthy flight comes near its threshold in many flights."""
+    """A warning if the residual of the healthy flight comes near its threshold in a share MANY of the faulted
+    flights."""
     if not rate["of"] or rate["rate"] < MANY:
         return ""
     return (
@@ -225,7 +225,8 @@ def _guarantee(counts: Document) -> str:
 
 
 def _drivers(ranking: list[Document]) -> str:
-    """The keys that explain an outcome significantly."""
+    """At most SHOWN keys that explain an outcome within MAX_P_VALUE and MIN_EXPLAINED. The p-value is not
+    adjusted for the number of keys."""
     keys = [
         entry for entry in ranking if entry["p_value"] <= MAX_P_VALUE and entry["explained"] >= MIN_EXPLAINED
     ][:SHOWN]
@@ -263,8 +264,8 @@ def _parts(summary: Document, folder: Path, figures: Mapping[str, Path]) -> list
         *_section("Flights worth a look", *tabulated(WORST, summary["worst"])),
         Links("Flights that have been flown again: ", links) if links else "",
         *_section("Flights that could not be flown", *tabulated(FAILED, summary["reasons"])),
-        *_section("Sensitivity", *tabulated(EXPLAINED, explained)),
-        _EXPLAINED if explained else "",
+        *_section("Sensitivity", *tabulated(SENSITIVITY, explained)),
+        _SENSITIVITY_NOTE if explained else "",
         f"{plan_text}; {versions_line(summary['versions'])}",
     ]
 
@@ -287,7 +288,7 @@ BY_FAULT = (
     ("named wrongly", "isolation.wrong.count"),
 )  # fmt: skip
 WORST = (("flight", "run"), ("why", "why", "; ".join), ("flies it again", "replay"))
-EXPLAINED = (
+SENSITIVITY = (
     ("outcome", "outcome"), ("key", "key"), ("explained", "explained", value),
     ("correlation", "rank_correlation", value), ("p", "p_value", value),
 )  # fmt: skip

@@ -11,15 +11,15 @@ from beaver_ftc.scenario.sweeps import Sweep
 from beaver_ftc.studies.sweep.one_flight import flight_name
 from beaver_ftc.studies.sweep.outcomes import Flights
 
-OF_EACH_KIND = 3  # flights of each kind of bad result
+OF_EACH_KIND = 3  # most flights of each kind of bad result
 
 Candidates = Iterator[tuple[int, str]]
 """(position of a flight in the table, its bad result in words)."""
 
 
 def worst_flights(flights: Flights, sweep: Sweep, command: str) -> list[Document]:
-    """A few flights with each kind of bad result: `run`, `name`, `why` (all bad results), `values`, and
-    `replay`, the command that flies it again. Each flight is listed once."""
+    """A few flights with each kind of bad result: `run`, `name`, `why` (the kinds for which it was chosen),
+    `values`, and `replay`, the command that flies it again. Each flight is listed once."""
     whys: dict[int, list[str]] = {}
     for position, why in _candidates(flights):
         whys.setdefault(position, []).append(why)
@@ -36,7 +36,7 @@ def worst_flights(flights: Flights, sweep: Sweep, command: str) -> list[Document
 
 
 def replay_command(source: str, out: Path, search: str | None) -> str:
-    """The command line that replays a flight, without the index of the flight."""
+    """The command line that replays a flight, without `--replay` and the index of the flight."""
     words = ["beaver-ftc", "sweep", source]
     words += ["--search", search] if search else []
     words += ["--out", str(out)] if str(out) != "runs" else []

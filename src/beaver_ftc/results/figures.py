@@ -112,12 +112,13 @@ def draw(
 
 def _restyle_for_paper(figure: "Figure") -> "Figure":
     """Shrink a figure to the width of a column of a journal, with letters of at most PAPER_FONT. The title
-    goes: the caption of the paper has it."""
+    is removed, because the caption of the paper has it; the legend is drawn again in two columns."""
     from matplotlib.text import Text
 
     shrink = PAPER_WIDTH / figure.get_figwidth()
     height = figure.get_figheight()
     figure.suptitle("")
+    # letters shrink less than the width: a tenth more height, and 0.25 inches for the labels of each panel
     figure.set_size_inches(PAPER_WIDTH, min(height, 1.1 * height * shrink + 0.25 * len(figure.axes)))
     figure.set_dpi(PAPER_DPI)
     for text in figure.findobj(Text):
@@ -250,8 +251,8 @@ def _draw_bars(axes: "Axes", panel: Panel, series: Values) -> None:
 
 
 def _limit_axis_to_quantiles(axes: "Axes", panel: Panel, series: Values) -> None:
-    """Set the limits of the axis by the AXIS_QUANTILES of the values; an arrow with its value marks the
-    largest spike beyond each limit."""
+    """Set the limits of the axis by the AXIS_QUANTILES of the values of all curves, which have no
+    offset in such a panel. An arrow with its value marks the largest spike beyond each limit."""
     values = np.concatenate([trace.factor * series[trace.column] for trace in panel.traces])
     values = values[np.isfinite(values)]
     if not values.size:
@@ -271,7 +272,7 @@ def _limit_axis_to_quantiles(axes: "Axes", panel: Panel, series: Values) -> None
 
 
 def _linestyle(dash: tuple[float, ...]) -> Any:
-    """Dashes (points) as matplotlib takes them: as multiples of the line width, which is about 1.5 points."""
+    """Dashes (points) as matplotlib takes them: as multiples of the line width, here taken as 1.5 points."""
     return (0, tuple(length / 1.5 for length in dash)) if dash else "-"
 
 
@@ -301,7 +302,7 @@ def _draw_event_marks(axes: "Axes", event_marks: Sequence[Mark], t_s: np.ndarray
 
 
 def _write_absent_text(view: View, series: Values, grid: Iterable["Axes"]) -> None:
-    """Write the text of a view whose columns have no data into its empty axes."""
+    """Write the text of a view, if it has one and none of its columns has data, into its empty axes."""
     if view.text_without_data and all(np.isnan(series[column]).all() for column in view.columns):
         for axes in grid:
             place: Any = {"transform": axes.transAxes, "ha": "center", "va": "center"}
@@ -309,8 +310,9 @@ def _write_absent_text(view: View, series: Values, grid: Iterable["Axes"]) -> No
 
 
 def _max_legend_columns(labels: Sequence[str], width: float) -> int:
-    """The largest number of legend columns for which these labels fit into a width, inches. A column takes
-    0.45 inches, and 0.06 for each letter of its longest label."""
+    """The largest number of legend columns, up to 12 in a figure of several columns and 9 in one of a single
+    column, for which these labels fit into a width, inches. A column takes 0.45 inches, and 0.06 for each
+    letter of its longest label; at least one is used."""
     for n in range(min(len(labels), 12 if width > 11 else 9), 1, -1):
         longest = (max(map(len, part)) for part in np.array_split(labels, n))
         if sum(0.45 + 0.06 * letters for letters in longest) < width:
@@ -319,8 +321,8 @@ def _max_legend_columns(labels: Sequence[str], width: float) -> int:
 
 
 def _legend_handle_of_label(grid: Sequence["Axes"]) -> dict[str, Any]:
-    """By label, the handle of each legend entry; the first axes with a label decide. A single curve whose
-    panel title names it has no entry."""
+    """By label, the handle of each legend entry; the first axes with a label decide. A label that is the
+    title of any panel, unit aside, has no entry."""
     entries: dict[str, Any] = {}
     for axes in grid:
         handles, labels = axes.get_legend_handles_labels()
@@ -330,15 +332,15 @@ def _legend_handle_of_label(grid: Sequence["Axes"]) -> dict[str, Any]:
 
 
 def _draw_legend(figure: "Figure", grid: Sequence["Axes"]) -> None:
-    """One legend below the figure. Each further line of the legend lowers the panels by
-    LEGEND_LINE_INCHES."""
+    """One legend below the figure. Each line of the legend beyond the first raises the lower edge of the
+    panels by LEGEND_LINE_INCHES: a height y of the figure becomes top - scale (top - y)."""
     entries = _legend_handle_of_label(grid)
     columns = _max_legend_columns(list(entries), figure.get_figwidth())
     height = figure.get_figheight()
     added = LEGEND_LINE_INCHES * (-(-len(entries) // columns) - 1) / height
     top = 1 - TOP / height
     scale = 1 - added * height / (height - TOP - BOTTOM)
-    for axes in grid if added else ():  # shrink towards the top, to make room below
+    for axes in grid if added else ():
         box = axes.get_position()
         axes.set_position((box.x0, top - scale * (top - box.y0), box.width, scale * box.height))
     figure.legend(

@@ -1,8 +1,9 @@
 """The expectations of a scenario (`expect:`), compared with the metrics, and their words: a row for each key.
 
-An expectation fails if its quantity does not exist, for example if there was no alarm. A name that was given
-before its fault began meets no expectation. A failed expectation of the diagnosis has a reason if the name
-was premature or withdrawn, or if there were frames in which the diagnosis could conclude nothing.
+An expectation fails if its quantity does not exist, for example if there was no alarm, unless it expects an
+absence. A name that was given before its fault began meets no expectation. A failed expectation of the
+diagnosis has a reason if the name was premature or withdrawn, or if there were frames in which the diagnosis
+could conclude nothing.
 """
 
 from collections.abc import Iterator
@@ -40,7 +41,8 @@ class Rule:
         return bool(actual == expected)
 
     def texts(self, result: Expectation) -> Texts:
-        """Expected and actual value in words; the second text is empty if both are equal."""
+        """Expected and actual value in words; the second text is empty if an equal value meets the
+        expectation."""
         is_as_expected = result.passed and result.actual == result.expected
         actual = "" if is_as_expected else value_text(result.actual)
         return f"{self.says} {value_text(result.expected)}", actual
@@ -79,7 +81,8 @@ class Flag(Rule):
     says_not: str
 
     def texts(self, result: Expectation) -> Texts:
-        """The words for the expected value, and those for the actual value if it is the opposite."""
+        """The words for the expected value, and those for the actual value if it exists and is the
+        opposite."""
         words = (self.says_not, self.says)
         is_as_expected = result.passed or result.actual is None
         return words[result.expected], "" if is_as_expected else words[result.actual]
@@ -189,7 +192,7 @@ class ExpectationInWords(NamedTuple):
     """An expectation compared with the flight.
 
     limit: the expected value. actual: the actual value; empty if it adds nothing. share_of_limit: |actual| /
-    limit; None if the expectation is no limit.
+    limit; None if the expectation is no limit, the limit is 0, or there is no actual value.
     """
 
     name: str
@@ -244,5 +247,6 @@ def without_underscores(name: str) -> str:
 
 
 def three_digits(value: float) -> str:
-    """A number of three significant digits, without an exponent below a million: 1230, not 1.23e+03."""
+    """A number of three significant digits, without an exponent from 0.0001 to a million: 1230, not
+    1.23e+03."""
     return f"{float(f'{value:.3g}'):g}"

@@ -15,7 +15,7 @@ from beaver_ftc.results.recordings import write_recording
 from beaver_ftc.results.style import marks
 
 ACMI_RATE_HZ = 25.0  # at most so many frames in a second of the recording: a viewer interpolates
-FLAP = "flap"  # a surface of this name is recorded as a share of its travel
+FLAP = "flap"  # a surface of this name is recorded as a share of its full deflection
 _FLAP_COLUMN = "flap_pos_rad"
 # The reference time is arbitrary. All runs have the same one, so that a viewer can overlay them.
 _ACMI_HEAD = """\
@@ -95,10 +95,11 @@ def _escape_acmi_text(text: str) -> str:
 
 
 def _acmi_frames(log_path: Path, metrics: Metrics, aircraft: Aircraft) -> Iterator[str]:
-    """The frames of the recording. An event stands behind the first frame whose time is not before it.
+    """The frames of the recording. An event stands behind the first recorded frame whose time is not before
+    it.
 
-    On a sphere of radius R (m), which touches the first frame: latitude = latitude_0 + north / R, longitude =
-    east / (R cos(latitude_0)), both in rad.
+    On a sphere about the centre of the Earth through the first frame, of radius R (m): latitude = latitude_0
+    + north / R, longitude = east / (R cos(latitude_0)), both in rad.
     """
     events = sorted(marks(metrics), key=lambda mark: mark.time_s)
     full_flap_rad = None

@@ -226,7 +226,7 @@ class Flight:
         return f"<b>{escape(verdict.title(self._typed_metrics))}</b><table>{rows}</table>"
 
     def _verdict_lines(self) -> list[tuple[str, str]]:
-        """(name, text) of the verdict, of the tracking errors and of missed expectations."""
+        """(name, text) of each line of the verdict, of the tracking errors and of missed expectations."""
         tracked = [
             ("tracking", f"p {p}  q {q}  r {r} deg/s RMS {when} the fault")
             for when, p, q, r in verdict.tracking_rms_in_words(self._typed_metrics)

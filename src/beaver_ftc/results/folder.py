@@ -85,8 +85,8 @@ def refuse_foreign(folder: Path, files: Iterable[str] = ()) -> None:
 
 
 def _foreign_files_in(folder: Path, files: Iterable[str]) -> list[str]:
-    """The files of a result folder that no command of ours writes: unknown names, pictures without our mark,
-    and in the copy of the aircraft all that is no model file."""
+    """The files of a result folder that no command of ours writes: unknown names, all in `figures` that is no
+    picture with our mark, and in the copy of the aircraft all that is no model file."""
     unknown = {entry.name for entry in folder.iterdir()} - FILES_OF_A_RUN - {*files}
     if unknown:
         from beaver_ftc.commands import files_of_commands

@@ -29,7 +29,7 @@ Values = dict[str, np.ndarray]
 ROWS_PER_GROUP = 16384  # 12 MB of 90 columns: large enough to compress well, small enough to hold
 _ROWS_PER_BLOCK = 256  # rows transposed at a time: a block fits the cache of the processor, four times faster
 _MAX_ROWS_PER_GROUP = 1_000_000  # a file with more is refused: a run writes ROWS_PER_GROUP
-_UNIT_OF_NAME_ENDING = (  # ending of a column's name, unit; the longest endings first
+_UNIT_OF_NAME_ENDING = (  # ending of a column's name, unit; `_rad_s` before `_s`, which it ends with
     ("_rad_s2", "rad/s2"), ("_deg2_s", "deg2/s"), ("_deg_s", "deg/s"), ("_rad_s", "rad/s"),
     ("_per_s", "1/s"), ("_rad", "rad"), ("_deg", "deg"), ("_mps", "m/s"), ("_inhg", "inHg"), ("_pa", "Pa"),
     ("_hz", "Hz"), ("_m", "m"), ("_s", "s"),
@@ -136,7 +136,7 @@ class Log:
 
     @property
     def frame_s(self) -> float:
-        """Time from one row to the next, s; infinite in a log of a single row."""
+        """Time from the first row to the next, s; infinite in a log of fewer than two rows."""
         first = next(self.read_chunks(["t_s"]), {"t_s": np.empty(0)})["t_s"][:2]
         return float(first[1] - first[0]) if first.size == 2 else math.inf
 

@@ -155,7 +155,8 @@ class Truth:
 
     def is_type_right(self, fault: DeclaredFault | None, kind: str | None, time_s: Quantity) -> bool | None:
         """Whether a type named at `time_s` is the type of `fault`, or of another fault that acts on the same
-        surface then. None if no type is named, or if `fault` has no type that can be named."""
+        surface then. None if no type is named, or if `fault` has no type that can be named; without `fault`,
+        a named type is wrong."""
         if fault is None:
             return None if kind is None else False
         others = [

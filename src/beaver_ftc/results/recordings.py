@@ -18,7 +18,7 @@ from beaver_ftc.aircraft import AXES
 from beaver_ftc.results import log
 
 ColumnsByTopic = dict[str, log.Values]
-"""Fields of each message; every message has the stamps `t_s`."""
+"""By topic, the fields of its messages; the stamps of the messages are in `Stamps`."""
 Stamps = NDArray[np.int64]
 """Time of each row, us."""
 Names = dict[str, dict[str, str]]
@@ -101,7 +101,7 @@ def write_recording(
 
 
 def _vehicle_file_text(names: Names, travel_rad: dict[str, float], kind: str) -> str:
-    """The text of vehicle.yaml. Angles of a dataflash log are in deg, all others in rad."""
+    """The text of vehicle.yaml. The attitude of a dataflash log is in deg, all other angles are in rad."""
     angle = "{{column: {}, unit: deg}}" if kind == "ardupilot" else "{!r}"
     commands = names["commands"]
     flow = names["flow"]
@@ -124,7 +124,7 @@ def _flow_mapping(entries: Mapping[str, object], form: str) -> str:
 
 
 def _write_table(path: Path, t_us: Stamps, topics: ColumnsByTopic) -> None:
-    """A CSV file; its columns are the fields of the one topic without a name."""
+    """A CSV file; its columns are `t_s`, s, and the fields of the one topic without a name."""
     import pyarrow as pa
     from pyarrow import csv
 

@@ -1,9 +1,9 @@
 """The report of one or more runs as one HTML file that needs nothing else: no network, no other file.
 
 The page draws the same views as the figures, from numbers of the log that it contains: the whole flight, and
-up to 10 000 points at the full rate around the fault. Its script (report.js) draws them. A plotting library
-would add one to four megabytes to every report, and has no marks, shades and mode bands like those of the
-figures.
+if that is thinned, also the time around the events with about 10 000 points. Its script (report.js) draws
+them. A plotting library would add one to four megabytes to every report, and has no marks, shades and mode
+bands like those of the figures.
 """
 
 import base64
@@ -38,8 +38,8 @@ ReportSection = Callable[[Path], str]
 results."""
 
 _TEMPLATE_FOLDER = Path(__file__).parent / "templates"
-AROUND_S = 2.5  # shown at the full rate before and after the events, s
-AT_FULL_RATE = 10_000  # most points of each curve at the full rate
+AROUND_S = 2.5  # shown in detail before and after the closer view of the events, s
+AT_FULL_RATE = 10_000  # about the most points of each curve there: longer times are thinned, too
 _FLIGHT_PATH_COLUMNS = ("north_m", "east_m", "altitude_m", "phi_rad", "theta_rad", "psi_rad")
 
 
@@ -58,7 +58,8 @@ def render(folders: Sequence[Path], names: Sequence[str] = (), sections: Sequenc
     """The report as HTML text.
 
     The legend has one entry for each name of a mark (fault, detection, ...) that any run has: the mark of the
-    last run that has it. The legend shows times only if there is a single run.
+    last run that has it. Only for a single run it shows times: the first one, and those of the others from
+    it on.
     """
     from markupsafe import Markup
 

@@ -52,9 +52,10 @@ def series_of(
     window_s: tuple[float, float] = WHOLE_FLIGHT_S,
     max_points: int = MAX_CURVE_POINTS,
 ) -> log.Values:
-    """`t_s` and the named columns within a window of time, each of shape (points,), about max_points at most.
+    """`t_s` and the named columns within a window begin <= t < end, each of shape (points,), about max_points
+    at most.
 
-    A longer log is cut into stretches of equal length. Each gives two points, its lowest and its highest
+    More rows are cut into stretches of equal length. Each gives two points, its lowest and its highest
     value, so that no peak is lost.
     """
     names = tuple(dict.fromkeys(("t_s", *columns)))

@@ -5,11 +5,12 @@
 A formula compares sums, differences, products and quotients of columns and numbers. Comparisons are joined by
 `not`, `and`, `or`, `implies` (or `->`), `until`, `always` and `eventually`, and for the past by `once` and
 `historically`. An interval is in s, both ends included; without an interval, an operator reaches to the end
-of the log.
+of the log, and one for the past to its begin.
 
 The robustness rho of a formula at frame k [Donze2010], in discrete time, is positive if the formula is
-fulfilled and negative if not. Its size is the least change of a signal that would change the result. K:
-frames k + begin to k + end of the interval; backwards for the past.
+fulfilled and negative if not. Its size is a margin: the result stays as long as the difference of the two
+sides of each comparison changes by less. K: frames k + begin to k + end of the interval; backwards for the
+past. Without a frame in K, rho is infinite: positive for always and historically, else negative.
 
     a <= b                          b - a
     not f, f and g, f or g          -rho(f), min(rho(f), rho(g)), max(rho(f), rho(g))
@@ -51,7 +52,7 @@ class FormulaError(ValueError):
 
 
 Interval = tuple[float, float] | None
-"""Begin and end, s from the present frame; None for all frames to the end of the log."""
+"""Begin and end, s from the present frame; None for all frames to the end of the log, or to its begin."""
 
 
 class Formula(NamedTuple):

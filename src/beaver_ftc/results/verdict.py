@@ -368,8 +368,8 @@ def _protection_limit_text(limit: ProtectionLimit) -> str:
 def _true_size_text(isolation: Named, metrics: Metrics) -> str:
     """The true size at the time of the estimate, if a fault of the named type was injected on this surface.
 
-    The time of the estimate is `estimate_at_s`, or else the last frame. It is written unless the only fault
-    of the surface is abrupt and lasts to the end, and the estimate belongs to the last frame.
+    The time of the estimate is `estimate_at_s`, or else the last frame. This time is written unless the only
+    fault of the surface is abrupt and lasts to the end, and the estimate belongs to the last frame.
     """
     faults = [fault for fault in metrics.faults if fault.actuator == isolation.fault]
     kind = isolation.type
@@ -425,8 +425,9 @@ def _isolation_text(metrics: Metrics) -> str:
 
 
 def _withdrawn_texts(heading: str, withdrawn: Sequence[Withdrawn]) -> list[str]:
-    """The withdrawn names, each once: how often it was given, from the first time to the last, in all, and
-    the reason of the last withdrawal."""
+    """The withdrawn names, each once, in a text below the heading: how often it was given if several times,
+    and for how long in all, from when to when, and the reason of the last withdrawal. No text without a
+    name."""
     entries_of_name: dict[str, list[Withdrawn]] = {}
     for entry in withdrawn:
         kind = f" ({without_underscores(entry.type)})" if entry.type else ""
@@ -457,8 +458,7 @@ def _probing_text(span_s: tuple[float, float]) -> str:
 
 
 def _type_text(isolation: Named) -> str:
-    """The type, or the types that remain. No text for an instrument or an unanticipated fault, which have no
-    type."""
+    """The type, or the types that remain. No text for an instrument, and for the type `unanticipated`."""
     if str(isolation.fault).startswith("sensor "):
         return ""
     if isolation.type is None:

@@ -40,7 +40,8 @@ _SHOWN_UNIT = {"rad/s2": "deg/s²", "rad/s": "deg/s", "rad": "deg", "1": ""}  # 
 
 @dataclass(frozen=True)
 class Trace:
-    """One curve: a column of the log, its label, and its role, which determines its look (style.py).
+    """One curve: a column of the log or derived from it, its label, and its role, which determines its look
+    (style.py).
 
     The shown value is factor * column + offset; offset has the shown unit.
     """
@@ -81,13 +82,13 @@ class Panel:
 
     @property
     def unit(self) -> str:
-        """The unit of the panel's traces, empty for a dimensionless quantity."""
+        """The unit of the first trace, which all traces share; empty for a dimensionless quantity."""
         return unit_of(self.traces[0].column)[0]
 
 
 @dataclass(frozen=True)
 class View:
-    """A figure: panels, filled row by row into `n_panel_columns` columns."""
+    """A figure: panels, filled row by row into `n_panel_columns` columns of panels."""
 
     name: str
     title: str
@@ -99,7 +100,7 @@ class View:
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """The log columns it shows."""
+        """The columns that it shows: of the log, or derived from it (series.py)."""
         traced = [trace.column for panel in self.panels for trace in panel.traces]
         flags = [
             flag for panel in self.panels for flag in (panel.shade_column, panel.bars_during_column) if flag

@@ -14,7 +14,7 @@ from beaver_ftc.studies.mismatch.split import split_flight
 
 PUBLISHED_CASE = "elevator-partial-loss"
 MAX_ROUNDS = 10  # of flights, each with a larger bound
-LEAST_RAD_S2 = 1e-4  # smallest bound that is widened
+LEAST_RAD_S2 = 1e-4  # smallest bound after widening, also of a bound of 0
 PerAxis = dict[str, float]  # constant part of eta_bar, rad/s2, by axis
 
 
@@ -22,7 +22,7 @@ def recommend(needed: Sequence[np.ndarray], at_least: PerAxis | None = None) -> 
     """The smallest constant parts of eta_bar, rad/s2 by axis, that would have covered every run.
 
     needed: of each run, the constant part (3,) rad/s2 that would have covered it. Each axis has the largest,
-    rounded up to two digits; none is below `at_least`.
+    rounded up to two digits; none is below `at_least`, by default 0.
     """
     bound_of_axis = dict(at_least or dict.fromkeys(AXES, 0.0))
     for axis, largest in zip(AXES, np.max(needed, axis=0).tolist(), strict=True):
@@ -31,7 +31,8 @@ def recommend(needed: Sequence[np.ndarray], at_least: PerAxis | None = None) -> 
 
 
 def widened(constant_rad_s2: PerAxis) -> PerAxis:
-    """The bound times 1.2, for alarms without an exceeded bound, which rounding and noise may cause."""
+    """The bound times 1.2, at least LEAST_RAD_S2 and rounded up, for alarms without an exceeded bound, which
+    rounding and noise may cause."""
     return {axis: rounded_up(max(1.2 * c, LEAST_RAD_S2)) for axis, c in constant_rad_s2.items()}
 
 

@@ -32,9 +32,9 @@ if TYPE_CHECKING:
 AXIS_NAMES = [f"{motion} {axis}" for axis, motion in MOTION_OF_AXIS.items()]
 LONGEST_BAR = 1e6  # length of a share of a bound that is zero
 SHOWN_SOURCES = 4  # curves in a panel
-LEAST_CURVE = 1e-3  # share of the peak of the largest source: a smaller source would be a line at zero
-LEAST_RATIO = 1e-6  # a smaller ratio is drawn with this length
-LEAST_SHARE = 1e-5  # a smaller share of the bound is not drawn
+LEAST_CURVE = 1e-3  # share of the peak of the largest source: a source with less would be a line at zero
+LEAST_RATIO = 1e-6  # length of the bar of a smaller ratio
+LEAST_SHARE = 1e-5  # a source has no bar if its share of the bound is smaller on each axis
 # Colour and dashes of each source. No flight is known in whose figure two sources have the same colour.
 SOURCE_LOOKS: dict[str, tuple[str, tuple[float, ...]]] = {
     "sensors": (SKY, (4, 1)), "actuators": (PURPLE, (6, 2, 1, 2)), "simplification": (VERMILION, ()),
@@ -73,7 +73,8 @@ def sources_figure(frames: Path, document: Document, instants: Sequence[Mark]) -
 
 
 def largest_sources(document: Document, axis: str) -> list[str]:
-    """The sources of an axis with the largest peaks, without faults, the largest first."""
+    """At most SHOWN_SOURCES sources of an axis with the largest peaks, without faults, the largest first;
+    none with a peak below LEAST_CURVE of the largest."""
     peaks = {name: document["axes"][axis][name]["max"] for name in CAUSES}
     by_peak = sorted(CAUSES, key=lambda name: -peaks[name])
     least = LEAST_CURVE * peaks[by_peak[0]]
@@ -109,7 +110,8 @@ def _dress(axes: "Axes") -> None:
 
 
 def bound_figure(document: Document) -> "Figure":
-    """Bars of the largest share of the bound that each source has used, a panel for each axis."""
+    """Bars of the largest share of the bound that each source above LEAST_SHARE has used, a panel for each
+    axis."""
     sources_of_axes = [document["axes"][axis] for axis in AXES]
     names = [
         name
@@ -220,7 +222,7 @@ def _draw_bode(magnitude: "Axes", phase: "Axes", analysis: LinearAnalysis, surfa
 
 def map_figure(entries: Sequence[Document], name: str) -> "Figure":
     """The largest mismatch over the bound against airspeed and altitude, a panel for each axis; hatched
-    without a trim.
+    without a trim, or if the ratio is infinite because the bound is zero.
 
     entries: for each altitude in order, for each airspeed, for each axis. The reshape relies on this order.
     """

@@ -28,7 +28,7 @@ JSBSim frames that led to it. At the start, the actuator rests at its command.
 The effects of faults are computed with G of the design, as in the theory:
 
     loss of effectiveness   the lost share of the position; of several losses, each takes its share of the
-                            effectiveness that those before it leave
+                            effectiveness that those before it in the scenario leave
     mechanism (jam, ...)    position of the surface less that of the healthy actuator; of several faults on
                             one surface, the fault that began last has all of it
     unanticipated           its own pitching moment
@@ -79,7 +79,7 @@ ENGINE_TERMS = tuple(term.name for term in load().moments if "dpt" in dict(term.
 Contributions = dict[str, np.ndarray]
 """Angular accelerations (n, 3) rad/s2 by source, or by part of a source."""
 Parts = Iterator[tuple[Any, np.ndarray]]
-"""(fault, its part of the deflection (n,) rad) of faults of a surface."""
+"""(fault, its part of the deflection (n,) rad) of each fault of a surface."""
 
 
 def healthy_positions(scenario: Scenario, commands: np.ndarray) -> np.ndarray:
@@ -221,7 +221,7 @@ def share(fault: Any, t_s: np.ndarray) -> np.ndarray:
 
 
 def _lost(faults: list, states: States, position: np.ndarray) -> Parts:
-    """The deflection (n,) rad that each loss takes, after the losses before it."""
+    """The deflection (n,) rad that each loss takes, after the losses before it in the scenario."""
     remaining = np.ones_like(position)
     for fault in faults:
         if fault.type == LOSS:

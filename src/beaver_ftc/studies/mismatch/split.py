@@ -87,8 +87,8 @@ class Split:
             return np.where(size > 0.0, size / self.eta_bar, 0.0)
 
     def magnitudes(self, values: np.ndarray, axis: int) -> Document:
-        """RMS and largest magnitude of an acceleration on an axis, rad/s2; its RMS over that of the total;
-        and its largest share of the bound."""
+        """RMS and largest magnitude of an acceleration on an axis, rad/s2; its RMS over that of the total, 0
+        if the total is 0; and its largest share of the bound, None if the bound is 0 there."""
         rms, total_rms = (
             float(np.sqrt(np.mean(acceleration[:, axis] ** 2))) for acceleration in (values, self.total)
         )
@@ -116,7 +116,7 @@ class Split:
 
     def _stay(self, ratio: np.ndarray, axis: int, first: int, after: int) -> Document:
         """An exceedance from frame `first` to before frame `after`: its times, its peak, and the largest
-        source there. ratio (n,): |eta| / eta_bar of the axis."""
+        of CAUSES at the peak. ratio (n,): |eta| / eta_bar of the axis."""
         peak = first + int(ratio[first:after].argmax())
         names = ("airspeed_mps", "altitude_m", "alpha_rad")
         return {
@@ -139,10 +139,11 @@ def split(scenario: Scenario, log: Log) -> Split:
     """Split the mismatch of a flight; log: its columns (n,).
 
     total[k] = (x[k+1] - x[k]) rate_hz - design_mean[k+1],     sampled[k] = xdot[k] - (f + G u)[k]
-    integration = total - sampled
+    integration = total - sampled,                             eta_bar[k]: the bound at row k+1
 
-    The last row has no next one, and total = sampled there. design_mean[k+1]: mean of f + G u over the frame
-    that ends at row k + 1, as the diagnosis computes it.
+    The last row has no next one: total = sampled there, and eta_bar is the bound of the row itself.
+    design_mean[k+1]: mean of f + G u over the frame that ends at row k + 1, as the diagnosis computes it.
+    (f + G u)[k]: of the design model at the measured state and the command.
     """
     m = Models(scenario)
     s = states_of(log)

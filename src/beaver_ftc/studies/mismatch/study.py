@@ -51,7 +51,7 @@ MAP = "mismatch-map"
 AIRSPEEDS_MPS = (30.0, 35.0, 40.0, 45.0, 50.0, 55.0)  # the validated envelope
 ALTITUDES_M = (0.0, 1000.0, 2000.0, 3000.0, 4000.0)
 # Keys of an axis in an entry of the comparison, and of the map; the first two of the map are those of the
-# bound.
+# bound. `dominant` of an axis: the source with the largest peak.
 _OF_BOUND = ("worst_ratio", "smallest_constant_rad_s2", "exceeded_s")
 _OF_MAP = ("worst_ratio", "smallest_constant_rad_s2", "dominant", "false_alarm")
 DECLARED = "declared"
@@ -135,7 +135,8 @@ def _axis(flight: Split, i: int) -> Document:
 
 
 def dominant(flight: Split) -> Document | None:
-    """The source, without faults, with the largest share of the bound, and its axis; None if all are zero."""
+    """The source, without faults, with the largest share of the bound in any frame, and its axis; None if all
+    are zero."""
     used = np.array([flight.shares(flight.contributions[name]).max(axis=0) for name in CAUSES])
     if not used.any():
         return None
@@ -162,7 +163,8 @@ def _as_files(document: Document, table: Iterable[Document]) -> Files:
 
 
 def entry(document: Document) -> Document:
-    """The entry of one flight in the comparison."""
+    """The entry of one flight in the comparison. `dominant` is by share of the bound, `AXIS_dominant` by the
+    peak."""
     recommended = document["guarantee"]["recommended"]
     return {
         "scenario": document["scenario"],
@@ -185,8 +187,8 @@ def write_comparison(out: Path, entries: list[Document], recommended: Document, 
 
 def map_study(scenario: Scenario, report: bool = True) -> Study:
     """The map of a scenario: an entry for each altitude, airspeed and axis, with the largest share of the
-    bound, the smallest constant that covers it, and the dominant source. report: whether a figure is
-    drawn."""
+    bound, the smallest constant that covers it, the source with the largest peak, and whether there is a
+    false alarm. report: whether a figure is drawn."""
 
     def drawn(document: Document) -> Files | None:
         return {f"{MAP}.png": charts.map_figure(document["map"], scenario.name)} if report else None
@@ -201,7 +203,8 @@ def map_study(scenario: Scenario, report: bool = True) -> Study:
 
 
 def _cell(scenario: Scenario, condition: tuple[float, float]) -> list[Document]:
-    """The entries of one condition, for a flight without faults; without a trim, all values are None."""
+    """The entries of one condition, one for each axis, for a flight without faults; without a trim, all
+    values are None."""
     airspeed_mps, altitude_m = condition
     place = {"airspeed_mps": airspeed_mps, "altitude_m": altitude_m}
     changes = {"initial": scenario.initial.model_copy(update=place), "faults": ()}

@@ -22,7 +22,7 @@ Table = tuple[str, list[str], list[list[str]]]  # caption, head, rows
 
 
 def share_text(share: float | None) -> str:
-    """A share in per cent, with two digits below 10 %. None: the bound is zero."""
+    """A share in per cent, with two digits below 10 %. None: the bound is zero where the share is largest."""
     if share is None:
         return "no bound"
     value = 100.0 * share
@@ -79,7 +79,8 @@ def _case(case: Document) -> str:
 
 
 def _reason(exceedances: list[Document]) -> str:
-    """The source of the largest exceedance."""
+    """The source of the largest of the listed exceedances; one without a bound, whose ratio is None, comes
+    last."""
     if not exceedances:
         return "-"
     return without_underscores(
@@ -93,7 +94,8 @@ def _needed(axis: str, entry: Document) -> str:
 
 
 _4_DIGITS = "{:.4g}".format
-# Columns of an axis: its bound, the smallest that covers the flight, the largest share, and exceedances.
+# Columns of an axis: its constant bound, the smallest one that covers the flight, the largest share of the
+# bound, and exceedances.
 BOUNDS = (
     ("axis", "axis"), ("constant", "constant_rad_s2", _4_DIGITS),
     ("smallest", "smallest_constant_rad_s2", _4_DIGITS), ("worst", "worst_ratio", share_text),

@@ -67,7 +67,7 @@ class Pictures(NamedTuple):
 Part = str | Heading | Table | Bullets | Links | Pictures
 
 
-Parts = Sequence[Part]  # the parts of a page from top to bottom; an empty text is left out
+Parts = Sequence[Part]  # the parts of a page from top to bottom; HTML leaves out an empty text
 
 
 def table(columns: Columns, rows: Iterable[Any]) -> Table:
@@ -113,7 +113,7 @@ def as_text(parts: Parts) -> str:
 
 
 def as_html(title: str, parts: Parts, figures: Drawn) -> str:
-    """The page as HTML, which contains the pictures."""
+    """The page as HTML, which contains the pictures. figures: the file of each picture."""
     body = html_of(parts, figures)
     page = (Path(__file__).parent / "page.html").read_text(encoding="utf-8")
     return page.format(title=escape(title), body=body)
@@ -125,7 +125,7 @@ def html_of(parts: Parts, figures: Drawn) -> str:
 
 
 def _html(part: Part, figures: Drawn) -> str:
-    """A part as HTML; verdicts in a table get a tick or a cross."""
+    """A part as HTML; verdicts in a table get a tick or a cross, and a text loses its backticks."""
     match part:
         case Heading():
             return f"<h2>{escape(part.text)}</h2>"

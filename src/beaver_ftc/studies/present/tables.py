@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 Rows = Sequence[Sequence[str]]
-LEAST = 1e-3  # a smaller number is written as <0.001
+LEAST = 1e-3  # a number with a smaller magnitude is written as <0.001 or >-0.001
 
 
 def finite(value: Any) -> Any:
@@ -28,15 +28,15 @@ def all_finite(row: Mapping[str, Any]) -> Document:
 
 
 def number(value: Any, unit: str = "", none: str = "-", digits: int = 3) -> str:
-    """A number with so many significant digits, without an exponent, and its unit. None is `none`; a text
-    stays as it is."""
+    """A number with so many significant digits, or all digits before the point, without an exponent, and its
+    unit. None and an empty text are `none`; another text stays as it is."""
     if value is None or isinstance(value, str):
         return value or none
     return f"{_digits(float(value), digits)} {unit}".rstrip()
 
 
 def _digits(value: float, digits: int) -> str:
-    """A number as text; an infinite one is `never`."""
+    """A number as text; an infinite one, and NaN, is `never`."""
     if not isfinite(value):
         return "never"
     if 0.0 < abs(value) < LEAST:
@@ -45,7 +45,7 @@ def _digits(value: float, digits: int) -> str:
 
 
 def percent(share: float | None, unit: str = " %") -> str:
-    """A share in whole per cent."""
+    """A share in whole per cent; `none` without a share."""
     return "none" if share is None else f"{100.0 * share:.0f}{unit}"
 
 

@@ -27,7 +27,7 @@ MEASURED = ("delay_s", "tracking_deg_s", "bound_used")
 FAILED = {"failed": True}  # the row of a flight that cannot be flown to its end
 FLIGHTS = 40  # of a row; if none has an event, its probability is below 9 % (95 % confidence)
 LATER_S = 4.0  # largest delay of the begin of the faults
-LEFT_S = 5.0  # shortest time from the begin of the faults to the end
+LEFT_S = 5.0  # shortest time that a delay leaves from the begin of the last fault to the end
 
 
 Errors = Sequence[Error]  # the errors of a scenario
@@ -65,7 +65,7 @@ def factors_of(errors: Errors, flight: Flight) -> dict[str, float]:
 
 
 def scenario_of(scenario: Scenario, errors: Errors, seed: int, flight: Flight) -> Scenario:
-    """The scenario of a flight. Random draws depend on its number alone, so that rows differ only by the
+    """The scenario of a flight. Random draws depend on seed and number alone, so that rows differ only by the
     error. The law always assumes the sensors of the scenario, also if the flight has larger errors."""
     draws = np.random.default_rng([seed, flight.run])
     changes: Document = {"seed": int(draws.integers(2**31)), "expect": {}}
@@ -94,7 +94,8 @@ def fly_one(scenario: Scenario, seed: int, flight: Flight) -> Document:
 
 def row_of(metrics: Metrics, bound_used: float) -> Document:
     """The row of a completed flight. bound_used: largest share of the detection bound that its healthy part
-    used."""
+    used. The tracking error is that of the worst axis after the first fault, or of the whole flight in a
+    scenario without a fault; None if the aircraft is lost."""
     isolation = metrics.isolation
     tracking = metrics.tracking
     rms = tracking.post_fault_rms_deg_s if metrics.fault else tracking.pre_fault_rms_deg_s
@@ -140,7 +141,8 @@ def document_of(
 
 
 def summary(rows: Sequence[Document]) -> Document:
-    """Counts and medians with their intervals. The tracking error of a lost aircraft counts as infinite."""
+    """Counts and medians with their intervals, of the completed flights. A number that is None, such as the
+    tracking error of a lost aircraft or the delay without a detection, counts as infinite."""
     completed = [row for row in rows if not row["failed"]]
     counts = {name: sum(row[name] for row in completed) for name in COUNTED}
     return {

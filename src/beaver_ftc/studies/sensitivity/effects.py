@@ -57,7 +57,7 @@ def _row_of(mechanism: Mechanism, cases: Sequence[Flight], rows: Outcomes) -> Do
 
 def effect_of(pairs: Sequence[Pair]) -> Document:
     """The effect of the mechanism in these pairs: net shares by criterion, and medians with and without it.
-    Pairs with a failed flight are left out."""
+    Pairs with a failed flight are left out; those with a false alarm are left out of the delays."""
     completed = [pair for pair in pairs if not any(outcome["failed"] for outcome in pair)]
     return {
         "flights": len(completed),
@@ -93,7 +93,7 @@ def net(pairs: Sequence[Pair], worse: Callable[[Document, Document], bool]) -> D
 
     Each share has an exact interval with half of the error probability [ClopperPearson1934]. By the union
     bound, both hold together with CONFIDENCE. The net share then lies between their smallest and largest
-    difference.
+    difference. Without pairs it is 0.
     """
     n = len(pairs)
     confidence = (1.0 + CONFIDENCE) / 2.0

@@ -1,9 +1,10 @@
 """The errors that a scenario declares, and the keys of a scenario in which they are multiples of the declared
 size.
 
-Each error has exactly the size of its limit, times a factor: every coefficient, inertia and bias is wrong by
-this amount with a random sign. An error that is not declared has a fixed size as its unit, and is absent from
-all flights in which it is not the enlarged error.
+Each error has exactly the size of its limit, times a factor, within the limits of its key: every coefficient,
+inertia and bias is wrong by this amount with a random sign. Turbulence has steps (`_air`). An error that is
+not declared has a fixed size as its unit, and is absent from all flights in which it is not the enlarged
+error.
 """
 
 from collections.abc import Callable, Mapping, Sequence

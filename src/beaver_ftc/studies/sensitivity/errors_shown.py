@@ -34,8 +34,8 @@ def page_of(document: Document) -> tuple[str, Sequence[Part]]:
 
 
 def error_sentences(document: Document) -> Iterator[str]:
-    """A sentence about the flights with all declared errors, and one for each error: the smallest factor at
-    which it changes the verdict."""
+    """A sentence about the flights with all declared errors at their limit, and one for each error: the
+    smallest factor with a false alarm or a wrong name."""
     errors = list(grouped(document["rows"], "error").values())
     alarms, misnamed = _counts(errors[-1][0])
     yield (
@@ -73,7 +73,7 @@ def _share(values: Document) -> str:
 
 
 def _interval(values: Document, form: Callable[[Any], str] = number_or_never) -> str:
-    """A median with its interval, unless the interval has no width."""
+    """A median with its interval, unless the median is infinite or the interval has no width."""
     value, limits = estimate(values, form)
     return value if values["value"] is None or values["low"] == values["high"] else f"{value} ({limits})"
 
@@ -93,7 +93,8 @@ COLUMNS = (
 
 
 def draw_errors(document: Document) -> "Figure":
-    """A row of panels for each quantity, a column for each error, over the factor. Bars are intervals."""
+    """A row of panels for each quantity, a column for each error, over the factor. Bars are intervals; a
+    value that is infinite has no point."""
     errors = [*grouped(document["rows"], "error").values()]
     titles = ["{error}\n{declared}".format(**rows[0]) for rows in errors]
     title = f"{document['scenario']}: errors larger than declared"

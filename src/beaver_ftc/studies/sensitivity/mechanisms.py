@@ -1,7 +1,8 @@
 """The flights that show the worth of each mechanism, and their outcomes.
 
     cell       a combination of fault, bandwidth of the law, undeclared error and instruments
-    draw       a random flight of a cell: airspeed, references, begin of the fault, and declared model errors
+    draw       a random flight of a cell: airspeed, references, begin of the fault, declared model errors, and
+               the signs of the undeclared ones
     outcome    the results of a system in a draw, with all of its mechanisms or without one of them
 
 Each system flies each draw with all of its mechanisms, and without each of them.
@@ -87,7 +88,7 @@ def cases_of(draws: int) -> list[Flight]:
 
 
 def scenario_of(flight: Flight, seed: int, system: str) -> Scenario:
-    """The flight of a system with all of its mechanisms. Random numbers depend on the cell and the run alone,
+    """The flight of a system with all of its mechanisms. Random numbers depend on seed, cell and run alone,
     so that both systems fly the same."""
     places = (values.index(value) for values, value in zip(FACTORS.values(), flight, strict=False))
     draws = np.random.default_rng([seed, *places, flight.run])
@@ -155,7 +156,7 @@ def without_mechanism(scenario: Scenario, mechanism: Mechanism) -> Scenario:
     """The scenario without a mechanism. A mechanism that is withheld from the law changes no key.
 
     Adaptive thresholds are replaced by the smallest constant threshold with the same guarantee: the largest
-    value of the adaptive threshold in the same flight without fault and undeclared errors.
+    value, over all axes, of the adaptive threshold in the same flight without fault and undeclared errors.
     """
     changed = scenario.with_(mechanism.without)
     if "fdi.options.adaptive_threshold" not in mechanism.without:
@@ -246,7 +247,8 @@ FAILED: Document = {
 
 
 def _tracking(metrics: Metrics) -> float | None:
-    """RMS tracking error of all axes after the fault, deg/s; None for a lost aircraft."""
+    """Root of the sum of the squared RMS tracking errors of the axes after the fault, deg/s; None for a lost
+    aircraft."""
     rms = metrics.tracking.post_fault_rms_deg_s
     return None if metrics.departure or rms is None else hypot(rms.p or 0.0, rms.q or 0.0, rms.r or 0.0)
 

@@ -72,7 +72,7 @@ def label(row: Document) -> str:
 
 
 def mechanism_sentence(row: Document) -> str:
-    """A sentence about the criteria that change significantly without a mechanism."""
+    """A sentence about the criteria whose net share without a mechanism has an interval that excludes 0."""
     flights = row["flights"]
     if row["same_verdict"] == row["same_tracking"] == flights:
         return f"{label(row)}: without it all {flights} flights are the same."
@@ -129,7 +129,7 @@ def _with_interval(head: str, key: str, cells: Callable[[Document], tuple[str, s
 
 
 def _certified(row: Document) -> str:
-    """Number of certified alarms; `-` for a scheme without certificates."""
+    """Number of certified alarms; `-` if there are alarms, but of a scheme without certificates."""
     return str(row["certified"]) if row["certifiable"] or not row["count"] else "-"
 
 

@@ -84,7 +84,7 @@ def save(picture: Picture) -> None:
     figure.savefig(picture.path, **_SAVE_OPTIONS_OF_FORMAT[kind])
 
 
-# No date: the same flight gives the same file.
+# No date: the same flight gives the same PNG and PDF. The ids of elements in an SVG are random.
 _SAVE_OPTIONS_OF_FORMAT: Options = {
     # level 1 of zlib: files are a tenth larger than with level 6, in two thirds of the time
     "png": {"metadata": {"Software": SOFTWARE_MARK}, "pil_kwargs": {"compress_level": 1}},
@@ -112,7 +112,8 @@ def draw(
 
 def _restyle_for_paper(figure: "Figure") -> "Figure":
     """Shrink a figure to the width of a column of a journal, with letters of at most PAPER_FONT. The title
-    is removed, because the caption of the paper has it; the legend is drawn again in two columns."""
+    is removed, because the caption of the paper has it; lines and symbols become thinner and smaller; the
+    legend is drawn again in two columns."""
     from matplotlib.text import Text
 
     shrink = PAPER_WIDTH / figure.get_figwidth()
@@ -337,9 +338,9 @@ def _draw_legend(figure: "Figure", grid: Sequence["Axes"]) -> None:
     entries = _legend_handle_of_label(grid)
     columns = _max_legend_columns(list(entries), figure.get_figwidth())
     height = figure.get_figheight()
-    added = LEGEND_LINE_INCHES * (-(-len(entries) // columns) - 1) / height
+    added = LEGEND_LINE_INCHES * (-(-len(entries) // columns) - 1)
     top = 1 - TOP / height
-    scale = 1 - added * height / (height - TOP - BOTTOM)
+    scale = 1 - added / (height - TOP - BOTTOM)
     for axes in grid if added else ():
         box = axes.get_position()
         axes.set_position((box.x0, top - scale * (top - box.y0), box.width, scale * box.height))

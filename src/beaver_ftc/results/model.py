@@ -362,8 +362,8 @@ class Isolation(Named):
 
     - `isolated`: True if a fault was named.
     - `withdrawn`: names of faults that the diagnosis gave and later withdrew, in the order of time.
-    - `names`: all names of faults that the diagnosis gave, in the order of the scenario's faults. Withdrawn
-      names are included, but premature names are not.
+    - `names`: all names of faults that the diagnosis gave, each once, in the order in which the faults begin.
+      Withdrawn names are included, but premature names are not.
     - `probing_s`: times at which probing began and ended, s; None without probing.
     - `faults`: one `Named` for each fault if several faults were named at once; otherwise empty.
     - `types_withdrawn`: fault types that the diagnosis gave and later withdrew, while the name of the surface
@@ -531,7 +531,8 @@ class EnginePowerUse(Part):
 
 @dataclass(frozen=True)
 class Deviations(Part):
-    """Deviations from the commanded profile by channel; None if the channel has no command."""
+    """Deviations from the commanded profile by channel; None if the channel has no command, or if a largest
+    angle had no time to settle."""
 
     altitude_m: Quantity
     airspeed_mps: Quantity

@@ -211,7 +211,8 @@ def assignment_of(sweep: Sweep, options: Options, index: int) -> Assignment:
 
 
 def replay(sweep: Sweep, options: Options, index: int) -> Document:
-    """Fly one flight of a sweep again, as `run` does, into `out/<sweep>/flights/`; return its metrics."""
+    """Fly one flight of a sweep again, as `run` does, into `out/<sweep>/flights/`; return its metrics
+    with the path of its folder. A report of the sweep is written again, with a link to it."""
     from beaver_ftc.results.writer import run
     from beaver_ftc.studies.sweep.summary_page import render
 

@@ -62,7 +62,8 @@ def score_of(scenario: Scenario, expectation: str) -> float:
 
         expectation              score
         no_departure             max |signal| / limit - 1, of all signals and frames
-        no_false_alarm           max |residual| / threshold - 1
+        no_false_alarm           max |residual| / threshold - 1 in healthy flight; a statistical detector has
+                                 score / alarm level in place of this ratio if it is larger
         a number                 |actual| / expected - 1, or |actual| if 0 is expected
         the same, not reached    time from the first fault, or else the start, to the end, s
 
@@ -166,6 +167,7 @@ def rare_study(sweep: Sweep, expectation: str, tell: Callable[[str], None] = lam
     """
     check(sweep, expectation)
     event = Event(sweep, expectation)
+    # no cases of its own: `rounds` makes them, and returns the document
     return Study(
         event.name, (), event.fly, dict, {"rare.json": as_json, "flight.yaml": event.likeliest},
         follows_from=[identity_of(sweep, expectation), RUNS, MEMBERS], lost=event.lost,

@@ -132,7 +132,7 @@ def _isolation(flights: Flights, group: np.ndarray) -> Document:
 
 def _false_alarms(flights: Flights) -> Document:
     """False alarms, their rate per hour in which an alarm would have been false, and the largest |residual| /
-    threshold in healthy flight."""
+    threshold in healthy flight, or score / alarm level of the statistical detector."""
     count, hours = flights.false_alarms
     return {
         "count": count,

@@ -54,7 +54,7 @@ def pictures_of(
     log_path: Path, metrics: Metrics, folder: Path, formats: Sequence[str] = ("png",)
 ) -> list[Picture]:
     """All pictures of a log: every view over the whole flight, and those with `closeup` also around the
-    fault.
+    events (`closeup_window`).
 
     formats: png, pdf, svg; PDF and SVG are drawn in the style of a paper.
     """

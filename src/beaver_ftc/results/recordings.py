@@ -173,7 +173,7 @@ def _write_dataflash(path: Path, t_us: Stamps, topics: ColumnsByTopic) -> None:
 
 
 def _dataflash_fmt_message(number: int, length: int, name: str, layout: str, labels: str) -> bytes:
-    """One FMT message, 89 bytes."""
+    """One FMT message, 89 bytes; name, layout and labels have at most 4, 16 and 64 bytes."""
     padded = (text.encode().ljust(size, b"\0") for text, size in ((name, 4), (layout, 16), (labels, 64)))
     return bytes([*_DATAFLASH_HEAD, _FMT, number, length]) + b"".join(padded)
 

@@ -95,7 +95,7 @@ class View:
     panels: tuple[Panel, ...]
     n_panel_columns: int = 1
     text_without_data: str = ""  # written into the panels if the columns have no data
-    closeup: bool = False  # also drawn around the fault
+    closeup: bool = False  # also drawn around the events
     folded: bool = False  # details: the report shows them after a click
 
     @property

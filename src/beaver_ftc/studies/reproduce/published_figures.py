@@ -36,13 +36,13 @@ _LEAST, _MOST = 1e-3, 10.0  # ends of the axis; a published ratio beyond is draw
 # ablation.
 _GROUPS = (NOT_BORNE_OUT, CANNOT_BE_JUDGED, BORNE_OUT, STRONGER)
 _LINE = 60  # characters of a line of a label
-_CLIPPED = {_LEAST: "<", _MOST: ">"}
-WHOLE = (0.0, np.inf)
+_CLIPPED = {_LEAST: "<", _MOST: ">"}  # marker of a ratio at an end of the axis
+WHOLE = (0.0, np.inf)  # spans of time, s
 CLOSE = (FAULT_AT_S - 0.5, FAULT_AT_S + 5.0)
 
 
 def _pair(label: str, target: tuple[str, str, str], actual: str) -> Panel:
-    """A panel of a signal and its target. target: column, label, look. actual: column of the signal."""
+    """A panel of a signal and its target. target: column, label, role. actual: column of the signal."""
     return Panel(label, (Trace(*target), Trace(actual, "actual", "actual")))
 
 

@@ -83,7 +83,8 @@ def run_sweep(
     """Fly a sweep into `out/<name>/` and return its summary.
 
     progress: called with the numbers of flights: `total` of the sweep, and so far `done`, `failed` (without
-    metrics), `faulted`, and `detected` of these. stopped: whether the user has stopped the sweep.
+    metrics), `faulted`, and `detected` of these (`counts_of`). stopped: whether the user has stopped the
+    sweep.
 
     Raises BadInput for a folder from which this sweep may not begin or go on (`Store.begin`),
     SimulationFailed where the folder cannot be written or no flight could be flown, SweepStopped if `stopped`

@@ -105,7 +105,8 @@ def table_of(sweep: "Sweep", schema: "pa.Schema", rows: Sequence[Row]) -> "pa.Ta
 
 
 def counts_of(rows: "Sequence[Row] | pa.Table") -> Counter[str]:
-    """Numbers of flights: `done`, `failed` (without metrics), `faulted`, and `detected` of these."""
+    """Numbers of flights: `done`, `failed` (without metrics), `faulted`, and `detected` of these: with an
+    alarm, also a false one."""
     if not isinstance(rows, Sequence):
         rows = rows.select(["status", "fault.type", "detection.detected"]).to_pylist()
     faulted = [row for row in rows if row["fault.type"] is not None]

@@ -181,7 +181,7 @@ def _empty_figure_and_axes(view: View, new_figure: Any) -> tuple["Figure", Any]:
 
 
 def _draw_panel(axes: "Axes", panel: Panel, series: Values, event_marks: Sequence[Mark]) -> None:
-    """A panel with its traces or bars, shade, marks and axes."""
+    """A panel with its traces (in steps for a discrete quantity) or bars, shade, marks and axes."""
     if panel.bars:
         _draw_bars(axes, panel, series)
     else:

@@ -148,10 +148,10 @@ def locked(folder: Path) -> Iterator[bool]:
     try:
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            locked = True
+            is_locked = True
         except OSError:
-            locked = False
-        yield locked
+            is_locked = False
+        yield is_locked
     finally:
         os.close(descriptor)
 

@@ -14,7 +14,7 @@ from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.documents.validation import one_line
 from beaver_ftc.results.model import Judged
 
-_MAX_LINE_CHARACTERS = 10_000  # characters of one line
+_MAX_LINE_CHARACTERS = 10_000  # of a line of a text
 
 
 def write_junit(runs: Sequence[Judged], path: Path) -> None:
@@ -62,5 +62,6 @@ def _seconds_text(took_s: float) -> str:
 
 
 def _xml_safe_text(text: str) -> str:
-    """Text that XML can hold: without control characters and lone surrogates, which XML cannot escape."""
+    """Text that XML can hold. Control characters and lone surrogates, which XML cannot escape, are written as
+    escapes of Python; each line is cut after _MAX_LINE_CHARACTERS."""
     return "\n".join(one_line(line, _MAX_LINE_CHARACTERS) for line in text.splitlines())

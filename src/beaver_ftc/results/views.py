@@ -165,8 +165,9 @@ def views(columns: Names, power: bool = False, within_mps: float | None = None) 
 def power_column(columns: Names) -> str:
     """The log column of the engine power that is commanded along a profile; empty if there is none.
 
-    Its name depends on the aircraft. It stands directly before `altitude_command_m`, the first command of the
-    profile; without such a column, `detected` or `watch_test` stands there.
+    The Beaver always has BEAVER_POWER_COLUMN. The column of another aircraft stands directly before
+    `altitude_command_m`, the first command of the profile; without such a column, `detected` or `watch_test`
+    stands there.
     """
     if BEAVER_POWER_COLUMN in columns:
         return BEAVER_POWER_COLUMN

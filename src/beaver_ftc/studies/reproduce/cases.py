@@ -32,7 +32,7 @@ ESTIMATORS = ("aileron", "elevator", "rudder")
 AXIS = {"aileron": "p", "elevator": "q", "rudder": "r", "unanticipated": "q"}  # axis of the effect of a fault
 PUBLISHED_LOSS = 0.4  # share of the effectiveness
 AFTER_S = 18.0  # time that is flown after the fault
-SETTLED_S = 2.0  # from the start or a fault to steady tracking: both poles of the error are at -1 1/s
+SETTLED_S = 2.0  # from the start or a fault to steady tracking: two time constants of the error
 
 
 Changes = Mapping[str, Any]

@@ -87,7 +87,7 @@ class Flight:
 
     @property
     def fault(self) -> model.Fault | None:
-        """The first fault declared."""
+        """The declared fault that begins first."""
         return self._typed_metrics.fault
 
     @property

@@ -62,7 +62,7 @@ def outcome_class(metrics: Metrics) -> str:
 
 
 def verdict_lines(metrics: Metrics) -> list[tuple[str, str]]:
-    """(name, text) of each line of the verdict, in the order of events."""
+    """(name, text) of each line of the verdict, from top to bottom."""
     declared = metrics.faults or (metrics.fault,)
     isolation = metrics.isolation
     lines = (

@@ -35,7 +35,7 @@ SHOWN_SOURCES = 4  # curves in a panel
 LEAST_CURVE = 1e-3  # share of the peak of the largest source: a source with less would be a line at zero
 LEAST_RATIO = 1e-6  # length of the bar of a smaller ratio
 LEAST_SHARE = 1e-5  # a source has no bar if its share of the bound is smaller on each axis
-# Colour and dashes of each source. No flight is known in whose figure two sources have the same colour.
+# Colour and dashes of each source. Sources of the same colour have different dashes.
 SOURCE_LOOKS: dict[str, tuple[str, tuple[float, ...]]] = {
     "sensors": (SKY, (4, 1)), "actuators": (PURPLE, (6, 2, 1, 2)), "simplification": (VERMILION, ()),
     "engine": (VERMILION, (7, 2)), "coefficients": (GREEN, ()), "inertia": (PURPLE, (3, 1)),

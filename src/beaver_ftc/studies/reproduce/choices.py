@@ -105,13 +105,15 @@ def gains() -> list[Gain]:
     ]
 
 
+def _with_keys(document: Document, values: Mapping[str, Any]) -> Document:
+    """A document with other values. values: by dotted key."""
+    return with_values(document, {parse_key(key): value for key, value in values.items()})
+
+
 # GIVEN and CHOICES together, as the sections of a scenario.
-SETTING: Document = with_values(
-    {}, {parse_key(key): value for key, value in {**GIVEN, **{c.key: c.value for c in CHOICES}}.items()}
-)
+SETTING = _with_keys(_with_keys({}, GIVEN), {c.key: c.value for c in CHOICES})
 
 
 def scenario(name: str, changes: Mapping[str, Any]) -> Scenario:
     """The scenario of the published setting with our choices. changes: values by dotted key."""
-    places = {parse_key(key): value for key, value in changes.items()}
-    return Scenario.model_validate(with_values({"name": name, **SETTING}, places))
+    return Scenario.model_validate(_with_keys({"name": name, **SETTING}, changes))

@@ -19,7 +19,7 @@ DIAGNOSIS, LAW = "diagnosis", "law"
 CONSTANT = "fdi.options.constant_threshold_rad_s"  # mechanisms.py computes its value for each flight
 ABRUPT: Changes = MappingProxyType({"fdi.fault_profile": "abrupt"})  # only with this key are sets intersected
 NORM_BOUND: Changes = MappingProxyType({"fdi.thresholds": "published"})
-SUDDEN_S = 0.01  # one frame: the shortest hand-over that a scenario admits
+SUDDEN_S = 0.01  # one frame of mechanisms.py: a scenario admits no hand-over of 0 s
 
 
 class Mechanism(NamedTuple):

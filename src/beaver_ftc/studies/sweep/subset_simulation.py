@@ -76,7 +76,7 @@ class Chains:
             return level
         level, self.reached[run] = min(level, 0.0), level >= 0.0
         share = float((scores >= level).mean())
-        # all scores are equal: no flight is closer to the event than the others
+        # every score reaches the level: at least nine tenths are equal, and chains would start no closer
         self.stuck |= share == 1.0 and not self.reached[run]
         self.share[run] *= share
         return level

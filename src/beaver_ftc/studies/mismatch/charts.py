@@ -222,7 +222,7 @@ def _draw_bode(magnitude: "Axes", phase: "Axes", analysis: LinearAnalysis, surfa
 
 def map_figure(entries: Sequence[Document], name: str) -> "Figure":
     """The largest mismatch over the bound against airspeed and altitude, a panel for each axis; hatched
-    without a trim, or if the ratio is infinite because the bound is zero.
+    without a trim.
 
     entries: for each altitude in order, for each airspeed, for each axis. The reshape relies on this order.
     """

@@ -79,8 +79,7 @@ def _case(case: Document) -> str:
 
 
 def _reason(exceedances: list[Document]) -> str:
-    """The source of the largest of the listed exceedances; one without a bound, whose ratio is None, comes
-    last."""
+    """The source of the largest of the listed exceedances (MAX_EXCEEDANCES of split.py)."""
     if not exceedances:
         return "-"
     return without_underscores(

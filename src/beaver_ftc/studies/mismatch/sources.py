@@ -10,10 +10,10 @@ changes one thing and keeps the changes of the steps before it, so that their su
       simplification     not frozen, not linearised
       engine             with the engine terms
       coefficients       with the truth's coefficients, term by term
-      inertia            with the truth's mass and inertia
+      inertia            with the mass and inertia of the aircraft file, without `uncertainty.inertia`
       inertia_coupling   with the declared errors of Pqr, Qpr, Rpq
       sinusoids          with the declared sinusoids
-      wind_turbulence    with the rates of the turning air in the damping terms
+      wind_turbulence    with the rates of the turning air in the damping terms; 0 if the log lacks them
       earth_rotation     on a turning Earth
       integration        as JSBSim's integration moves the rates
 
@@ -155,9 +155,9 @@ class Models:
 
     - design: the design model, which may be linearised about the trim or have a frozen alpha.
     - untied: neither linearised nor frozen. whole: with the terms of the engine. turning: with the
-      coefficients of the truth. truth: with its mass and inertia.
+      coefficients of the truth. truth: with the mass and inertia of the aircraft file.
     - parts: by name of each coefficient that differs, `whole` with this coefficient of the truth.
-    - inertia: inertia coefficients of the truth.
+    - inertia: inertia coefficients of `truth`.
     """
 
     def __init__(self, scenario: Scenario) -> None:

@@ -61,8 +61,9 @@ class States:
 
 
 def states_of(log: Log) -> States:
-    """The states from log columns (n,). If a log has no measured column, the true column is taken: the sensor
-    was ideal."""
+    """The states from log columns (n,). A column that the log lacks, measured or relative to the air, is
+    replaced by the true one. The log of a flight has of these only the measured rates: measured air data
+    count as exact, and the air as not turning."""
     together = {
         name: np.column_stack([log[column if column in log else _TRUE[column]] for column in columns])
         for name, columns in _TOGETHER.items()

@@ -633,8 +633,8 @@ def check_theta(statement, effect, frames):
 
 def check_term_frames(term, statement, frames):
     """Refuse frames `since`, `first` and k of a term that are out of order, later than the event, or, except
-    in blocks, before the diagnosis started. A theta that is constant while it shows needs a frame k that
-    health does not explain. A term without a pole has one frame, since = k - 1. Returns `since`."""
+    in blocks, before the diagnosis started. For a theta that is constant while it shows, health explains
+    none of the frames since + 1 to k. A term without a pole has one frame, since = k - 1. Returns `since`."""
     k = term["frame"]
     first = term["first"]
     since = term.get("since", k - 1)
@@ -642,9 +642,8 @@ def check_term_frames(term, statement, frames):
     require(begun <= since < first <= k < len(frames.rates_rad_s), "the frames of a term are not in order")
     require(frames.row_of(k) <= statement["frame"], "a frame after the event cannot have caused it")
     require("pole_per_s" in term or first == k, "without a pole a term has one frame")
-    require(
-        statement["theta"] != "constant while it shows" or frames.is_unexplained[k], "health explains a frame"
-    )
+    shown = frames.is_unexplained[since + 1 : k + 1].all()
+    require(statement["theta"] != "constant while it shows" or shown, "health explains a frame")
     return since
 
 

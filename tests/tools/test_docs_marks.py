@@ -69,13 +69,6 @@ BROKEN = {
 }
 
 
-@pytest.mark.parametrize("text", BROKEN)
-def test_a_broken_mark_is_a_line(text):
-    found = words(parsed(text, "docs/page.md").findings)
-    assert any(BROKEN[text] in line and line.startswith("docs/page.md:") for line in found), found
-    assert all("\n" not in line for line in found)
-
-
 DEAR = "<!-- printed: fly far | dear | probe: fly near | at {} -->\n```text\n12 h\n```\n<!-- /printed -->\n"
 NEAR = {"fly near": Output("0.02"), "fly far": Output("13 h")}
 STANDS = DEAR.format(f"1ab 2026-01-02 {digest_of('0.02')}")

@@ -1,7 +1,7 @@
 """Names in prose: those of the code, its files and commands pass; one letter more, and it is a line."""
 
 import pytest
-from tools.docs import names, prose
+from tools.docs import names
 
 SHOWN = frozenset({"MyCusum", "cusum"})
 GOOD = (
@@ -39,8 +39,3 @@ BARE = {
     "See section 4.2 and equations (14) and (15).": False,
     "On 2026-11-20 with JSBSim 1.3.3.": False,
 }
-
-
-@pytest.mark.parametrize("text", BARE)
-def test_a_number_that_no_command_prints_is_counted(text):
-    assert bool(list(prose.numbers(text))) == BARE[text]

@@ -87,8 +87,9 @@ def excitation(scenario: Scenario) -> Excitation:
 
 
 def moments_of(scenario: Scenario, log: Log) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray]:
-    """z = G u along a flight of n frames, according to the design model: by name of each surface in the class
-    of losses, (n, 3) rad/s2. Also eta_bar (n, 3) rad/s2, and G (n, 3, surfaces) rad/s2 per rad."""
+    """z = G u along a flight of n frames, according to the design model, with the commands u: by name of each
+    surface in the class of losses, (n, 3) rad/s2. Also eta_bar (n, 3) rad/s2, and G (n, 3, surfaces) rad/s2
+    per rad."""
     aircraft = scenario.airframe
     y = _side_by_side(log, "alpha_rad", "beta_rad", "airspeed_mps", "qdyn_pa", *aircraft.signals)
     u = _side_by_side(log, *(f"{surface}_cmd_rad" for surface in aircraft.surfaces))
@@ -121,7 +122,8 @@ def mismatch(
     bound), b = other / (2 bound), and t is the b of the module.
 
     max_i |a_i - b_i t| is convex and piecewise linear in t. Its minimum is where two of +-(a_i - b_i t) are
-    equal, where one of them is zero (i = j, sign -1), or at a limit. All these t are tried.
+    equal, where one of them is zero (i = j, sign -1), or at a limit. All these t are tried; a t beyond a
+    limit is clipped to it.
     """
     a, b = z / (2.0 * bound), other / (2.0 * bound)
     best = np.full(len(a), np.inf)
@@ -163,7 +165,8 @@ def judge(flight: Excitation, fault: str) -> Document:
     """Smallest magnitudes of a fault that are certain to be detected and isolated in time along a flight.
 
     detected, isolated: at every instant at which it may begin. `..._median`: at half of these instants. None:
-    not even a total loss. confused_with: the fault that is excluded last. why: the limit in words.
+    not even a total loss. confused_with: the fault that only the largest losses exclude. why: the limit in
+    words.
     """
     z = flight.moment[fault]
     detect, isolate = flight.windows

@@ -152,7 +152,7 @@ class Detectability(StudyCommand):
             raise BadInput(f"--surface {self.surface!r:.60}: allowed: {', '.join(known)}")
         study = places.places_study(scenario, self.airspeed or (), self.altitude or ())
         document = run_into(study, self.out, self.processes, reporter.progress)
-        folder = document.pop("folder")  # the last key but the engines
+        folder = document.pop("folder")  # set again as the last key but the engines
         if self.surface is not None:
             document |= {
                 part: [row for row in document[part] if row["fault"] == self.surface] for part in places.PARTS

@@ -1,4 +1,5 @@
-"""Limits of one frame in trim: surfaces with similar effects on the rates, and failures of engines."""
+"""Limits of one frame, SETTLED_S into a healthy flight: surfaces with similar effects on the rates, and
+failures of engines."""
 
 from itertools import combinations
 from math import degrees
@@ -19,7 +20,7 @@ from beaver_ftc.studies.detectability.certain import (
 )
 from beaver_ftc.studies.present.tables import all_finite
 
-ALIKE_DEG = 3.0  # surfaces that need a larger deflection to be distinguished have similar effects
+ALIKE_DEG = 3.0  # a pair has similar effects if one of the two needs a larger deflection to be distinguished
 
 
 def alike(scenario: Scenario) -> list[Document]:
@@ -50,9 +51,9 @@ def _short(scenario: Scenario) -> Scenario:
 
 
 def engine_failures(scenario: Scenario) -> list[Document]:
-    """A row for each engine that is an effector.
+    """A row for each engine that is an effector; none without a thrust table or a power setting.
 
-    - turns_rad_s2 (3,): size of the angular acceleration by a failure to idle in trim: effect of the engine
+    - turns_rad_s2 (3,): size of the angular acceleration by a failure to idle: effect of the engine
       for each m/s2 of push times push, force at the setting in trim over mass.
     - shows: the same over the detection limit of one frame.
     - known: whether its moment is a signal, which the design model contains. held: whether the diagnosis also

@@ -33,12 +33,13 @@ def loss_limits(excluded: np.ndarray, frames: int, dt: float) -> Document:
     excluded (n,): smallest loss, 0 to 1, for which the frame alone excludes the other surface; infinite where
     no loss does. frames: number of frames within which the other surface has to be excluded. dt: length of a
     frame, s. A delay includes the frame in which the loss begins. next_exclusion (n,): from each frame on,
-    the first frame in which a total loss excludes the other surface; n if there is none.
+    the first frame in which a total loss excludes the other surface; n if there is none. A loss begins at
+    least `frames` before the end.
     """
     smallest = best_in_window(excluded, frames)
     n = len(excluded)
-    next_exclusion = np.where(excluded <= 1.0, np.arange(n), n)
-    next_exclusion = np.minimum.accumulate(next_exclusion[::-1])[::-1]
+    own = np.where(excluded <= 1.0, np.arange(n), n)
+    next_exclusion = np.minimum.accumulate(own[::-1])[::-1]
     delay_s = np.where(next_exclusion < n, (next_exclusion - np.arange(n) + 1) * dt, inf)
     limits = (*largest_and_median(smallest), *largest_and_median(delay_s[: len(smallest)]))
     return dict(zip(LOSS_COLUMNS, limits, strict=True))

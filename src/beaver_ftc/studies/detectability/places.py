@@ -44,10 +44,11 @@ def places_study(
     altitudes_m: Sequence[float] = (),
     excitations: Sequence[float] = EXCITATIONS,
 ) -> Study:
-    """The survey of a scenario at all combinations of these airspeeds, altitudes and excitations. Empty: the
-    usual ones.
+    """The survey of a scenario at all combinations of these airspeeds, altitudes and excitations. No
+    airspeeds or altitudes: the usual ones.
 
-    Raises BadInput if another scheme than the sharpened one diagnoses.
+    Raises BadInput if another scheme than the sharpened one diagnoses, or its fastest filter is below 1e6
+    1/s.
     """
     fdi = scenario.fdi
     sharp = fdi.sharpen.pole_bank and fdi.sharpen.memory and fdi.sharpen.shared_effectiveness
@@ -76,8 +77,9 @@ def usual_airspeeds(aircraft: Aircraft, of_the_beaver: tuple[float, ...]) -> tup
 
 
 def with_aircraft(scenario: Scenario, reference: str) -> Scenario:
-    """The scenario with another aircraft in its own start condition. Faults and errors of the truth belong to
-    the first aircraft and are left out. A folder is looked for in the working directory."""
+    """The scenario with another aircraft in its own start condition, with ideal actuators. Faults, model
+    errors and declared servo errors belong to the first aircraft and are left out. A folder is looked for in
+    the working directory."""
     find_aircraft(reference, Path())
     given = {"aircraft": reference, "initial": {}, "uncertainty": {}, "actuators": "ideal"}
     return Scenario.model_validate(_without_faults(scenario) | given)

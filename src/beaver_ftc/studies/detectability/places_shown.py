@@ -76,7 +76,7 @@ def conclusions(rows: Rows) -> list[str]:
 
 
 def _conclusion(fault: str, scale: float, rows: Rows) -> str:
-    """The loss that is certain at all places with a result, and how many these are."""
+    """The loss that is certain at all places where some loss is, and how many these are."""
     certain = [row["isolated"] for row in rows if row["isolated"] is not None]
     reference = "the scenario's references" if scale == 1.0 else f"{scale:g} times the scenario's references"
     if not certain:

@@ -61,7 +61,7 @@ def _by_condition(watched: Iterable[Watched]) -> dict[Key, list[Trace]]:
 
 def rows_of(faulted: Iterable[Watched], levels: dict[Key, float]) -> list[Row]:
     """A row for each flight and scheme. Schemes without a level, and blocks that our own schemes could not
-    fly, have no rows: the failures have the reasons.
+    fly, have no rows: the failures have the reasons. Flights that end before their fault have none either.
 
     delay_s: at the level of the common rate. own_delay_s: at level 1, with which the scheme ships. None
     without an alarm. An alarm before the fault is a false_alarm and no detection.
@@ -119,13 +119,14 @@ def limit(rows: Rows, per_h: float) -> Document:
 
 PLACE = ("sensors", "turbulence", "surface")
 CELL = (*PLACE, "excitation_deg_s", "magnitude", "scheme")
-SIGNIFICANT = 0.05  # a smaller p is no chance
+SIGNIFICANT = 0.05  # with a smaller p, a scheme counts as better or worse
 JUDGED_S = 1.0  # the delay within which figures show the share detected
 DUELS_S = (JUDGED_S, WATCHED_S)
 
 
 def document_of(grid: Grid, healthy: Sequence[Watched], faulted: Sequence[Watched]) -> Summary:
-    """The document, with the rows of `rows_of` behind it. Raises BadInput if no flight could be judged."""
+    """The document, with the rows of `rows_of` behind it. Raises BadInput if no healthy flight could be
+    judged."""
     watched, faulted_traces = _by_condition(healthy), _by_condition(faulted)
     failures = sorted({failure for outcome in (*healthy, *faulted) for failure in outcome.failures})
     if failures and not watched:
@@ -178,8 +179,8 @@ def _lines(rows: Rows, names: Sequence[str], what: Callable[[Rows], Document]) -
 
 
 def _comparison(rows: Rows) -> list[Document]:
-    """Each of our schemes against each other scheme in the same flights, by the faults found within each of
-    DUELS_S.
+    """Each of our schemes against each scheme that is not ours, in the same flights, by the faults found
+    within each of DUELS_S.
 
     The flights of a seed have the same noise. A seed therefore counts once, for the scheme that finds more of
     its faults.

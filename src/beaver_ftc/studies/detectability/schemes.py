@@ -4,7 +4,8 @@
     block       a condition, an excitation and a seed: flights that are the same until the fault begins
     grid        the conditions, excitations, faults and numbers of blocks of a survey
 
-A block is flown once for each fault of the grid. All schemes diagnose the same flights.
+A block with faults is flown for each fault of the grid, and again for each scheme of FLOWN_THEMSELVES. The
+nominal law reads no verdict, so that all schemes diagnose the same flights.
 """
 
 from collections.abc import Mapping, Sequence
@@ -70,7 +71,7 @@ Faults = tuple[tuple[str, float], ...]
 class Grid:
     """The survey.
 
-    - conditions, surfaces, magnitudes, excitations_deg_s: all combinations are flown.
+    - conditions, surfaces, magnitudes, excitations_deg_s: all combinations are flown with faults.
     - blocks: flights of each combination. healthy_h: hours without a fault for each condition;
       healthy_flight_s: length of such a flight, s.
     - per_h: false alarms per hour at which the schemes are compared.
@@ -109,7 +110,8 @@ class Grid:
         self, aircraft: str | None, airspeed_mps: float | None, altitude_m: float | None, surface: str | None
     ) -> "Grid":
         """The same flights with another aircraft, airspeed or altitude, or with losses of one surface; None
-        is as before. Raises BadInput for a surface that is not in the class of losses."""
+        is as before. Without a surface, another aircraft loses all of its class of losses. Raises BadInput
+        for a surface that is not in the class of losses."""
         class_of_losses = find_aircraft(aircraft or DEFAULT, Path()).class_of_losses
         if surface is not None and surface not in class_of_losses:
             raise BadInput(f"--surface {surface!r:.60}: allowed: {', '.join(class_of_losses)}")
@@ -130,7 +132,8 @@ class Grid:
         ]
 
     def healthy(self) -> list[Block]:
-        """The blocks without a fault, which set the levels. Their seeds differ from those with faults."""
+        """The blocks without a fault, which set the levels; the excitations take turns. Their seeds differ
+        from those with faults."""
         count = round(self.healthy_h * 3600.0 / self.healthy_flight_s)
         excitations = self.excitations_deg_s
         return [
@@ -224,7 +227,7 @@ def deflections(
 ) -> list[float]:
     """The deflection d of a loss of effectiveness in a recorded flight, each of these times after its begin:
     the size of its effect -magnitude * moment, (frames, 3) rad/s2, in the whitened noise, in standard
-    deviations."""
+    deviations. A time beyond the end counts as the end."""
     frames_with_fault = [
         measured for measured, _ in recording.seen if measured.t_s > recording.fault_at_s + 1e-9
     ]

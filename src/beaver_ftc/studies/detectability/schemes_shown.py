@@ -85,7 +85,8 @@ def _soon(total: Document | None) -> Line:
 def who_is_better(
     document: Document, sensors: str, turbulence: str, within_s: float = WATCHED_S
 ) -> Iterator[str]:
-    """A sentence for each surface under a condition: the scheme that finds most faults within `within_s`."""
+    """A sentence for each surface under a condition: the scheme that finds most faults within `within_s`. Of
+    our schemes, only BOTH is compared."""
     condition = {"sensors": sensors, "turbulence": turbulence}
     soon = f"{within_s:g}"
     for surface in document["grid"]["surfaces"]:
@@ -183,8 +184,8 @@ def draw_schemes(document: Summary) -> "Figure":
 
 
 def _draw(panel: "Axes", rows: Sequence[Row], names: Sequence[str], document: Document) -> None:
-    """The share that each scheme detects, with its exact 95 % interval. Magnitudes are drawn below one
-    another, `apart` from line to line."""
+    """The share that each scheme detects, with its exact 95 % interval, and that of the informed test.
+    Magnitudes are drawn below one another, `apart` from line to line."""
     magnitudes = document["grid"]["magnitudes"]
     within = f"{JUDGED_S:g}"
     apart = 0.6 / len(magnitudes)

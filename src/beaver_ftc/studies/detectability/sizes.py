@@ -1,7 +1,8 @@
 """The flights that show the smallest loss that is detected in time, and what limits it.
 
 A flight is the scenario without its own faults, with a loss of one surface. Seed and begin of the loss are
-random; its size is given. The loss begins between SETTLED_S, when the references have settled, and the end.
+random; its size is given. The loss begins after SETTLED_S, when the references have settled, and early enough
+for the requested time to pass before the end.
 
     found      an alarm within the requested time
     certain    within this time, detection is guaranteed (`guaranteed_delay_s` of the metrics)
@@ -64,8 +65,8 @@ class Flight(NamedTuple):
 
 @dataclass
 class _Flown:
-    """The rows of all flights so far; each flight is flown once. fly: flies a round. tell: takes a line of
-    progress."""
+    """The rows of the flights of all variants so far; each flight is flown once. fly: flies a round. tell:
+    takes a line of progress with the variant of the round and the number of rows."""
 
     fly: FlyRound
     tell: Callable[[str], None]
@@ -92,7 +93,8 @@ def sizes_study(scenario: Scenario, asked: Asked, tell: Callable[[str], None]) -
     variants = dict(variants_of(scenario, asked.surface))
     return Study(
         f"{scenario.name[:70]}-{NAME}-{asked.surface}", (), partial(fly_one, variants, asked),
-        dict, sizes_shown.FILES, follows_from=[scenario, asked], lost=lambda flight, why: _row(failed=True),
+        document=dict, files=sizes_shown.FILES, follows_from=[scenario, asked],
+        lost=lambda flight, why: _row(failed=True),
         rounds=lambda fly: _document(scenario, asked, variants, _Flown(fly, tell)),
     )  # fmt: skip
 
@@ -104,7 +106,7 @@ def check(scenario: Scenario, asked: Asked) -> None:
         raise BadInput(f"--surface {asked.surface!r:.60}: allowed: {', '.join(surfaces)}")
     if scenario.fdi.scheme == "none":
         raise BadInput(f"{scenario.name}: fdi.scheme: none diagnoses nothing, allowed: a scheme")
-    shortest_s = SETTLED_S + 2.0 * asked.within_s
+    shortest_s = SETTLED_S + 2.0 * asked.within_s  # the begins are then spread over at least within_s
     if scenario.duration_s < shortest_s:
         raise BadInput(
             f"{scenario.name}: duration_s: too short for --within, allowed: {shortest_s:g} or more"
@@ -112,7 +114,8 @@ def check(scenario: Scenario, asked: Asked) -> None:
 
 
 def fly_one(variants: dict[str, Scenario], asked: Asked, flight: Flight) -> Document:
-    """The row of a flight."""
+    """The row of a flight, which ends two frames after the requested time. bound_used: largest |residual| /
+    threshold of all filters before the loss."""
     scenario = variants[flight.variant]
     draws = np.random.default_rng([asked.seed, flight.run])
     seed = int(draws.integers(2**31))
@@ -174,8 +177,8 @@ def _left_out(scenario: Scenario) -> Iterator[tuple[str, Document]]:
 
 
 def _other_references(scenario: Scenario, surface: str) -> Iterator[tuple[str, Document]]:
-    """(name, changed keys) of variants whose reference moves the surface more, on the axis of its largest
-    effect."""
+    """(name, changed keys) of variants with a larger or faster reference on the axis of the largest effect of
+    the surface; with a sine, if this axis has no reference."""
     axis = axis_of(scenario, surface)
     signals = scenario.model_dump(mode="json", exclude_none=True)["reference"].get(axis, [])
     for quantity, keys in (("amplitude", AMPLITUDES), ("frequency", _FREQUENCIES)):
@@ -191,7 +194,8 @@ _FREQUENCIES = ("frequency_hz", "start_frequency_hz", "end_frequency_hz")
 
 
 def _document(scenario: Scenario, asked: Asked, variants: dict[str, Scenario], flown: _Flown) -> Document:
-    """Fly all variants; the answer for the scenario as it is, compared with the others."""
+    """Fly all variants; the answer for the scenario as it is, and under `compared` those for the others.
+    inconclusive, bound_used: of the flights of the scenario as it is."""
     answer = _answer(AS_IT_IS, flown, STAGES)
     compared = [_answer(name, flown, FIRST) for name in variants if name != AS_IT_IS]
     rows = [row for flight, row in flown.rows.items() if flight.variant == AS_IT_IS]

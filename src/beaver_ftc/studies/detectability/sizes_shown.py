@@ -99,7 +99,8 @@ def _doubts(document: Document) -> Iterator[str]:
 
 def _is_better(variant: Document, document: Document) -> bool:
     """Whether a variant finds smaller losses than the scenario as it is, so that the intervals do not
-    overlap. If the scenario finds no loss often enough: whether the variant finds a total loss more often."""
+    overlap. If the scenario finds no loss often enough: the same of the shares in which a total loss is
+    found."""
     size = variant["found"]
     base = document["found"]
     if base["size"] is None:

@@ -1,10 +1,11 @@
 """The size of a fault that a given share of flights finds, with an interval that assumes no shape of the
 curve.
 
-Each flight i has a smallest size X_i at which its fault is found. Its noise, its air and the begin of the
-fault are kept while the size changes. The share of flights that find size m is P(X <= m). The size that 90 %
-of the flights find is therefore the 0.9 quantile of X, whatever the shape of P(X <= m). Order statistics of n
-flights bound it without an assumption about the distribution [Wilks1941; studies/engine/statistics.py].
+Each flight i has a smallest size X_i at which its fault is found, and is assumed to find it at all larger
+sizes. Its noise, its air and the begin of the fault are kept while the size changes. The share of flights
+that find size m is P(X <= m). The size that 90 % of the flights find is therefore the 0.9 quantile of X,
+whatever the shape of P(X <= m). Order statistics of n flights bound it without an assumption about the
+distribution [Wilks1941; studies/engine/statistics.py].
 
 Only three order statistics of X are needed, not each X_i. Each is found by bisection over the size, as in
 quickselect. A flight that has found size a is not flown at larger sizes, and one that has missed size b not
@@ -88,7 +89,8 @@ class Sizes:
 
 
 def threshold(is_found: IsFound, share: float, stages: Sequence[int] = STAGES) -> Threshold:
-    """The size found in a share of flights, with its two-sided interval."""
+    """The size found in a share of flights, with its two-sided interval. stages: number of flights after each
+    stage; a further stage is flown only if the interval is not narrow."""
     sizes = Sizes(is_found, stages[-1])
     one_sided = 1.0 - 0.5 * (1.0 - CONFIDENCE) / len(stages)
     for flights in stages:

@@ -21,7 +21,7 @@ PACKAGE = Path(__file__).resolve().parents[2]
 NO_ROWS = ("cli", "commands", "pytest_plugin")
 
 
-def of(what: str, asked: Document) -> Document:
+def of_request(what: str, asked: Document) -> Document:
     """The identity of a study. what: `study` or `sweep`, the key of the resolved request `asked`. It also has
     the versions of the packages of this machine, and the fingerprint of the code."""
     document = {what: asked, "versions": {**versions(), **plug_ins(), "flight code": fingerprint()}}
@@ -39,16 +39,15 @@ def read_identity(manifest: Path, what: str) -> Document | None:
 
 
 def refuse_other(mine: Document, theirs: Document, folder: Path) -> None:
-    """Raise BadInput unless the flights in a folder have my identity, `mine`. theirs: the identity of these
-    flights, which are in `folder`."""
-    kind = next(iter(mine))
-    changed = differences(theirs.get(kind, {}), mine[kind])
+    """Raise BadInput unless this sweep has the identity of the flights in its folder. mine, theirs: the
+    identities of this sweep and of these flights."""
+    changed = differences(theirs["sweep"], mine["sweep"])
     if changed:
         raise BadInput(
-            f"{folder}: the {kind} file has changed since these flights ({', '.join(changed)}): "
-            f"resuming would mix two {kind}s, allowed: the unchanged file, or another --out"
+            f"{folder}: the sweep file has changed since these flights ({', '.join(changed)}): "
+            "resuming would mix two sweeps, allowed: the unchanged file, or another --out"
         )
-    then = theirs.get("versions", {})
+    then = theirs["versions"]
     now = mine["versions"]
     changed = [f"{name} {then.get(name)} then, {now.get(name)} now" for name in differences(then, now)]
     if changed:
@@ -100,7 +99,7 @@ def fingerprint() -> str:
 
 
 def digest_of_aircraft(folder: Path) -> str:
-    """A digest of the files of an aircraft, which distinguishes aircraft with the same name."""
+    """A digest of the XML and YAML files of an aircraft, which distinguishes aircraft with the same name."""
     return digest(
         path for path in sorted(folder.rglob("*")) if path.suffix in (".xml", ".yaml") and path.is_file()
     )

@@ -150,7 +150,7 @@ def _keeping(study: Study, out: Path) -> Iterator[store.Parts]:
 def fly_all(fly: Fly, cases: Sequence[Any], workers: int, progress: Progress | None = None) -> list[Any]:
     """fly(case) of every case, in order. No row is kept in a file."""
 
-    def is_new(number: Number, runs: Sequence[int]) -> None:
+    def none_landed(number: Number, runs: Sequence[int]) -> None:
         """No rows have landed before."""
 
     def forget(number: Number, rows: Any) -> None:
@@ -158,7 +158,7 @@ def fly_all(fly: Fly, cases: Sequence[Any], workers: int, progress: Progress | N
 
     make = partial(_workers, Work(fly), workers)
     pieces = store.batches_of(len(cases), 1)
-    with contextlib.closing(Flying(is_new, forget, make, _fail)) as flying:
+    with contextlib.closing(Flying(none_landed, forget, make, _fail)) as flying:
         rows_of_piece = _fly_pieces(flying, dict(pieces), cases, progress)
     return [rows_of_piece[n][0] for n in range(len(cases))]
 
@@ -171,8 +171,8 @@ def _workers(work: Work, workers: int, cases: int) -> Workers:
 def _begin(hidden: Path, study: Study) -> store.Parts:
     """The parts of this study. Parts of another study, or of other versions, are removed; parts without a
     readable manifest are set aside."""
-    contents = {"cases": repr(list(study.cases)), "asked": repr(study.follows_from)}
-    mine = identity.of("study", contents)
+    request = {"cases": repr(list(study.cases)), "asked": repr(study.follows_from)}
+    mine = identity.of_request("study", request)
     manifest = hidden / "study.json"
     parts = store.Parts(hidden / "parts", store.RowsAsJson(study.row), GO_ON)
     earlier = identity.read_identity(manifest, "study")

@@ -46,7 +46,7 @@ def identity_of(sweep: Sweep, search: str | None = None) -> Document:
     of_file = {key: value for key, value in file.items() if key not in _NOT_FLOWN}
     aircraft = identity.digest_of_aircraft(sweep.aircraft.folder)
     of_run = {"runs": sweep.flights, "base": sweep.base, "aircraft": aircraft, "search": search}
-    return identity.of("sweep", {**of_file, **of_run})
+    return identity.of_request("sweep", {**of_file, **of_run})
 
 
 class RowsAsParquet:

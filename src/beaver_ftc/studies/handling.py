@@ -88,7 +88,8 @@ def of_model(linear: LinearModel, airspeed_mps: float, where: str) -> Qualities:
 
 def _values(by_name: Mapping[str, Mode], g_per_rad: float) -> dict[tuple[str, str], float]:
     """Each quantity of LIMITS by mode and name. g_per_rad: load factor per angle of attack, n/alpha, 1/rad;
-    the control anticipation parameter CAP is w^2 / (n/alpha), w of the short period, rad/s."""
+    the control anticipation parameter CAP is w^2 / (n/alpha), w of the short period, rad/s; infinite if
+    n/alpha is not positive."""
     short, dutch, phugoid = by_name["short_period"], by_name["dutch_roll"], by_name["phugoid"]
     roll = by_name["roll"].pole
     spiral = by_name["spiral"].pole.real
@@ -122,7 +123,7 @@ def where_trimmed(scenario: Scenario) -> Qualities:
 
 def where_ended(scenario: Scenario, end: Mapping[str, float]) -> Qualities:
     """The qualities of the aircraft at the end of a flight, with the effective deflections of its surfaces
-    then. end: the last row of the log by column.
+    then. end: the last row of the log by column; engine settings that it lacks are those of the trim.
 
     Raises SimulationFailed if the aircraft cannot be linearised there.
     """

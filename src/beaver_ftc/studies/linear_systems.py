@@ -50,8 +50,8 @@ def modes(A: np.ndarray) -> dict[str, Mode]:
     lateral = share[len(LONGITUDINAL) :].sum(axis=0) / share.sum(axis=0)
     order = np.argsort(lateral)
     slow, *_, fast = sorted(poles[order[:4]], key=abs)
-    dutch, _, *real = sorted(poles[order[4:]], key=lambda pole: -abs(pole.imag))
-    spiral, roll = sorted(real, key=abs)
+    dutch, _, *others = sorted(poles[order[4:]], key=lambda pole: -abs(pole.imag))
+    spiral, roll = sorted(others, key=abs)
     pole_of = {"short_period": fast, "phugoid": slow, "roll": roll, "dutch_roll": dutch, "spiral": spiral}
     return {name: Mode(complex(pole_of[name].real, abs(pole_of[name].imag))) for name in MODES}
 
@@ -82,9 +82,8 @@ def zeros(A: np.ndarray, b: np.ndarray, row: int) -> np.ndarray:
     system = np.block([[A, b[:, None]], [c[None, :], np.zeros((1, 1))]])
     eigenvalues = eigvals(system, np.diag([1.0] * n + [0.0]))
     finite = eigenvalues[np.isfinite(eigenvalues) & (np.abs(eigenvalues) < MAX_ZERO_PER_S)]
-    size = [
-        float(f"{magnitude:.6g}") for magnitude in np.abs(finite)
-    ]  # the last digits of a pair differ by machine
+    # six digits: the last digits of a pair differ by machine
+    size = [float(f"{magnitude:.6g}") for magnitude in np.abs(finite)]
     return finite[np.lexsort((-finite.imag, size))]
 
 

@@ -139,7 +139,8 @@ def interpolated(law: DefaultLaw, qdyn: float, lost: float) -> np.ndarray:
 def allocation(G: np.ndarray, main: np.ndarray, stand_in: int, lost: float) -> np.ndarray:
     """Commands for each demanded acceleration, (n, 3) rad per rad/s2, within the travels. G (3, n); main:
     surface of each axis. Aileron and rudder solve roll and yaw together; the stand-in takes the share `lost`
-    of pitch, the elevator the rest. `allocate` in control/allocation.py computes the same."""
+    of pitch, the elevator the rest. If these have no solution, because one of them is given up, each solves
+    its own axis. `allocate` in control/allocation.py computes the same."""
     commands = np.zeros((G.shape[1], 3))
     a, e, r = main[[ROLL, PITCH, YAW]]
     flap = lost if stand_in >= 0 else 0.0
@@ -160,7 +161,8 @@ def outputs(states: tuple[str, ...], y: np.ndarray) -> np.ndarray:
     signals.
 
     d qdyn / dV = 2 qdyn / V, as qdyn ~ V^2. d dpt / dV = -3 dpt / V of the slipstream, the one declared
-    signal of the Beaver, which is ~ V^-3. Their dependence on altitude is left out.
+    signal of the Beaver, which is ~ V^-3; every declared signal is treated like it. The dependence on
+    altitude is left out.
     """
     C = np.zeros((3 + len(y), len(states)))
     for row, name in enumerate((*AXES, "alpha", "beta", "airspeed")):

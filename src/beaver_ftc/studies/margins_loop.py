@@ -1,6 +1,6 @@
 """The default law's loop in closed form, broken at one surface, a frequency at a time.
 
-    u_s = L_s v_s
+    u_s = -L_s v_s
 
 v_s: deflection of surface s. u_s: deflection that the loop then commands, with all other loops closed. The
 aircraft is linear, with inputs held over a frame. studies/margins.py has the numbers of a flight condition.
@@ -119,8 +119,8 @@ def loops(loop: OpenLoop, omega: np.ndarray) -> np.ndarray:
 
 
 def _others_closed(N: np.ndarray, s: int) -> Any:
-    """Response that returns to surface s, (...), with the loops of the other surfaces r closed. N = around,
-    (..., n, n):
+    """Response -L_s that returns to surface s, (...), with the loops of the other surfaces r closed. N =
+    around, (..., n, n):
 
     N_ss + N_sr (I - N_rr)^-1 N_rs
     """

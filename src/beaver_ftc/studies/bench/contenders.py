@@ -32,11 +32,11 @@ class Contender(Protocol):
 
 
 def interleave(contenders: Sequence[Contender], rounds: int, frames: int) -> np.ndarray:
-    """Time all contenders in turn, A B C in one round, C B A in the next; microseconds for a frame, (rounds,
-    contenders).
+    """Time all contenders in turn, A B C in one round, C B A in the next; processor time of a frame,
+    microseconds, (rounds, contenders).
 
-    Differences and ratios are formed within a round, which lasts some milliseconds, so that a change of the
-    speed of the machine cancels. Medians over the rounds are taken afterwards.
+    The caller forms differences and ratios within a round, so that slow changes of the speed of the machine
+    cancel, and then medians over the rounds.
     """
     us = np.empty((rounds, len(contenders)))
     order = list(range(len(contenders)))
@@ -103,6 +103,7 @@ class ClosedLoop:
         self.loop.sample_references(first, self.loop.n_frames - first)
         self.moment = Moment.of(self.loop.plant)
         self._frames = self.loop.frames.copy()
+        # None: a loop with a plug-in is stepped from Python
         self._fly_on = self.loop.fly_on if self.loop.fly_frame is None else None
 
     def with_frame(self, compiled_frame: Callable[..., int]) -> "ClosedLoop":
@@ -150,7 +151,8 @@ def take_over(scenario: Scenario, at_s: float) -> Moment:
 
 
 class InnovationDetector:
-    """Alarm if |xdot - model| > eta_bar on an axis, rad/s2: xdot the difference of the rates over a frame."""
+    """Alarm from the first frame on in which |xdot - model| > eta_bar on an axis, rad/s2; xdot: change of the
+    rates over a frame / dt."""
 
     def reset(self, context: Context) -> None:
         """Forget the rates and the alarm."""

@@ -86,10 +86,11 @@ def _processor() -> str:
 
 
 def _phase(scenario: Scenario, at_s: float, rounds: int, with_parts: bool) -> Document:
-    """Time of the bare aircraft, of the loop, and of the loop with one more part at each step. All fly the
-    same aircraft in the same memory.
+    """Time of the bare aircraft, of the loop, and of the loop with one more part at each step, first without
+    any ("calling"). All fly the same aircraft in the same memory.
 
-    us (rounds,): time of a frame with a part, microseconds; before (rounds,): the time without this part.
+    us (rounds,): time of a frame with the parts up to a part, microseconds; before (rounds,): without this
+    part.
     """
     names = ["calling", *PARTS] if with_parts else []
     whole_loop = ClosedLoop(scenario, at_s)
@@ -115,7 +116,8 @@ def _figures(name: str, values: np.ndarray) -> Document:
 
 
 def _alternatives(scenario: Scenario, rounds: int) -> Document:
-    """Times of a loop as a user might write it, and of our loop with a detector or law in Python."""
+    """Times of a loop as a user might write it, and of our loop with a detector or law in Python, or with all
+    properties through Python."""
     at_s = AFTER_ALARM_S
     contenders: dict[str, Contender] = {
         "straightforward": Straightforward(scenario, at_s, FRAMES),

@@ -1,8 +1,9 @@
 """The compiled frame with parts of it taken out, for timing.
 
-A part is a set of kernels. To take it out, each of its kernels is replaced by a stand-in that does nothing.
-All kernels that call it are then compiled again from the same source, so that the frame itself without this
-part is timed.
+A part is a set of kernels. To take it out, each of its kernels is replaced by a stand-in, which does nothing
+or returns a constant. All kernels that call it are then compiled again from the same source. Parts are
+switched on one after another: the time of a part is the difference of two frames, with the parts up to it and
+with those before it.
 """
 
 import hashlib
@@ -81,8 +82,8 @@ PARTS: dict[str, dict[str, Kernel]] = {
 
 
 def frame_with(switched_on: int) -> Kernel:
-    """`stepping.fly_on` with the first `switched_on` parts of PARTS. Each is compiled once, into a cache of
-    its own, whose name has a digest of this file."""
+    """`stepping.fly_on` with the first `switched_on` parts of PARTS, and without all others. Each frame with
+    a part taken out is compiled once, into a cache of its own, whose name has a digest of this file."""
     if switched_on == len(PARTS):
         return import_module("beaver_ftc.loop.stepping").fly_on
     stand_ins: dict[str, Kernel] = {}
@@ -93,7 +94,8 @@ def frame_with(switched_on: int) -> Kernel:
 
 
 def frame_without(stand_ins: Mapping[str, Kernel], name: str) -> Kernel:
-    """A private `stepping.fly_on`. stand_ins: by name of a kernel, its stand-in. name: of the cache."""
+    """A private `stepping.fly_on`. stand_ins: by name of a kernel, its stand-in. name: of the cache. Raises
+    ValueError if a kernel does not exist."""
     used: set[str] = set()
     folder = compiled.cache_folder()
 
@@ -103,7 +105,7 @@ def frame_without(stand_ins: Mapping[str, Kernel], name: str) -> Kernel:
         full_name = f"{function.__module__}.{function.__name__}".removeprefix("beaver_ftc.")
         used.add(full_name)
         made_of = stand_ins.get(full_name, function)
-        return compiled.compile_into(folder and folder / name, made_of, for_size)
+        return compiled.compile_into(folder / name if folder else None, made_of, for_size)
 
     with _fresh_kernel_modules(kernel):
         fly_on = import_module("beaver_ftc.loop.stepping").fly_on
@@ -118,10 +120,13 @@ def _fresh_kernel_modules(kernel: Callable[..., Kernel]) -> Iterator[None]:
     decorates. At the end, the old modules return.
     """
     usual = compiled.kernel
+    # a module of kernels has imported the decorator; `compiled`, which defines it, stays
     modules = {
         name: module
         for name, module in sys.modules.items()
-        if name.startswith("beaver_ftc.") and module is not compiled and getattr(module, "kernel", 0) is usual
+        if name.startswith("beaver_ftc.")
+        and module is not compiled
+        and getattr(module, "kernel", None) is usual
     }
     # packages are listed before a module is removed, because some packages have kernels themselves
     packages = {name: sys.modules[name.rpartition(".")[0]] for name in modules}

@@ -1,8 +1,8 @@
 """The loop as one writes it first: properties by name, published equations in NumPy, a dictionary a frame.
 
 It flies the published scheme: the detection estimator with its network, three isolation estimators with
-interval thresholds, and feedback linearisation. The bench compares the time and the verdict of the loop with
-it. The modules of the loop have the sources of the equations.
+interval thresholds, and feedback linearisation. The bench compares its time with that of the loop; tests
+compare its verdict. The modules of the loop have the sources of the equations.
 """
 
 import numpy as np
@@ -138,7 +138,8 @@ class Estimators:
     def judge(self, x: np.ndarray, alpha: float, beta: float) -> None:
         """Compare the estimates with the measured x (3,) rad/s: raise the alarm, exclude faults.
 
-        alarm: |x - x_hat| > threshold;  not excluded: -R+ - Om theta - B <= eps <= -R- - Om theta + B
+        alarm: |x - x_hat| > threshold on any axis. Not excluded, as long as on every axis
+        -R+ - Om theta - B <= eps <= -R- - Om theta + B. Alarm and exclusion are final.
         """
         self.residual = x - self.x_hat
         if not self.detected and (np.abs(self.residual) > self.threshold).any():
@@ -186,7 +187,8 @@ def _basis(alpha: float, beta: float) -> np.ndarray:
 
 
 class FeedbackLinearisation:
-    """Reference model and proportional-integral feedback. The flap stays in trim.
+    """Reference model and proportional-integral feedback. The flap stays in trim, the other deflections u are
+    within MAX_DEFLECTION_RAD.
 
     error = x_model - x,   I <- I + dt error,   u = G^-1 (xdot_model + Kp error + Ki I - f - unknown)
     """

@@ -22,8 +22,8 @@ Taken = tuple[np.ndarray, int, float]
 
 
 class Kind(NamedTuple):
-    """Flights of a built-in sweep. changes: further keys of their scenarios. alike: whether all begin in the
-    same trim, as those of `matrix` do."""
+    """Flights of a built-in sweep. changes: further keys of their scenarios. alike: whether each flight is
+    the first of the sweep, so that all begin in the same trim, as flights of `matrix` at one airspeed do."""
 
     sweep: str
     changes: Document | None = None
@@ -75,8 +75,8 @@ def by_kind(rounds: int) -> dict[str, Document]:
 
 
 def _flown(sweep: Sweep, kind: Kind, run: int) -> Taken:
-    """The times of one flight, with all that `sweep` does for it. The trim is computed again for each flight,
-    or once before if all flights begin alike.
+    """The times of one flight, with all that `sweep` does for it. The trim is computed within the second
+    stage; if all flights of a kind begin alike, before the timing.
     """
     (assignment,) = Plan(sweep).assignments([0 if kind.alike else run])
     conditions.forget_trims()

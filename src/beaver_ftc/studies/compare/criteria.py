@@ -15,16 +15,16 @@ e: RMS tracking error of all axes after the fault, deg/s. e_oracle: that of the 
 lost aircraft counts as e / e_oracle = `LOST`. A candidate is admissible if
 
     - without a fault, it keeps the gain and phase margins that the scenario requires of the default law, at
-      every surface that leads an axis, over the airspeeds of the envelope;
+      every surface that leads an axis, at the slowest and the fastest airspeed of the envelope;
     - the RMS rate of all surfaces together, over the same flights, is at most `EFFORT` times that of the
-      default law.
+      default law; tested if the trial does not end early.
 
 A candidate that is not admissible costs `INADMISSIBLE` or more; the cost grows with the violation.
 
 The flight of a plug-in ends with a false alarm, because nothing after it changes its cost. A trial ends early
 once it cannot win. The trial of a detector, whose parts only add up, ends when the sum exceeds the lowest J
 so far. The trial of a law ends when J over `LEAST_FLIGHTS` or more flights is `HOPELESS` times the lowest J
-so far. The cost of such a trial is that of the flights until then.
+so far. The cost of such a trial is extrapolated from the flights until then.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -59,7 +59,7 @@ DELAY_S = 1.0  # an alarm with this delay costs half as much as a missed fault
 # Cost of a law.
 LOST = 100.0  # e / e_oracle of a flight that loses the aircraft, and the largest of any flight
 EFFORT = 1.1  # largest RMS surface rate over that of the default law
-LEAST_FLIGHTS = 4  # a trial flies at least so many flights
+LEAST_FLIGHTS = 4  # a trial does not end early before so many flights
 HOPELESS = 1.5  # J over the lowest J so far at which a trial ends
 # Costs in place of J.
 INADMISSIBLE = 1e3  # above every J
@@ -147,7 +147,7 @@ class DetectorCost(Cost):
         self._faulted = sum(bool(case.scenario.faults) for case in cases)
 
     def __call__(self, values: Values) -> float:
-        """J with these values."""
+        """J with these values, or its extrapolation if the trial ends early."""
         total = 0.0
         try:
             for n, (_, part) in enumerate(self._flights(values), 1):

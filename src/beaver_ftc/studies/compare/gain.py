@@ -6,8 +6,8 @@ gain is the share by which the values found cost less there:
 
     gain = 1 - J(found) / J(built in)
 
-Its interval is a bootstrap over the flights, in pairs [Efron1993]. A method that keeps the values that it
-ships with gains nothing.
+Its interval is a bootstrap over the flights, in pairs [Efron1993]. The values found are judged even if they
+cost so little less that tune.py keeps the built-in ones. If both are the same, the gain is 0.
 """
 
 from collections.abc import Callable, Sequence
@@ -25,7 +25,8 @@ Size = Callable[..., np.ndarray]  # from the parts (..., n) of a cost, along an 
 
 
 def gain_of(group: str, name: str, grade: str, settings: Sequence[Values], first: int) -> Document:
-    """The costs of two settings, and the gain of the second, on `JUDGED` draws from the draw `first` on."""
+    """The costs of two settings (built in, found), and the gain of the second, on `JUDGED` draws from the
+    draw `first` on. judged: number of draws."""
     draws = range(first, first + JUDGED)
     costs: Sequence[Cost]
     size: Size

@@ -1,9 +1,9 @@
-"""Stability margins of any law, compiled or plugged in, measured in flight.
+"""Stability margins of any law, compiled or plugged in, measured in flight unless a closed form is known.
 
     L_s = -(v - d) / v
 
-In trim, a pulse d of one frame is added to the command of surface s. v: position of the surface minus that in
-the same flight without the pulse. v is linear in a small d. L_s, of the transforms of v and d, is the loop
+In trim, a pulse d of one frame is added to the position of surface s. v: position of the surface minus that
+in the same flight without the pulse. v is linear in a small d. L_s, of the transforms of v and d, is the loop
 broken at this surface with all other loops closed. studies/margins.py has the same loop of the default law in
 closed form, and tests compare the two. The actuators are as declared, and the sensors keep their lag and
 delay. Noise and moving air are left out, and no scheme diagnoses.
@@ -33,8 +33,8 @@ NO_MARGIN = 0.0, 0.0, 0.0  # gain up, gain down, phase
 
 
 def margins_of(scenario: Scenario) -> list[Margin]:
-    """The margins of a scenario's law over the airspeeds of the envelope, of the surfaces that lead an
-    axis."""
+    """The margins of a scenario's law at N_AIRSPEEDS of the envelope, of the surfaces that lead an axis: in
+    closed form for a law with the loop of the default law, otherwise measured."""
     flights = closed_form.over_envelope(scenario, N_AIRSPEEDS)
     if scenario.control.law in flown_by("rejecting"):
         return [  # `closed_form.at` yields the margins of the healthy aircraft ("none") before all others

@@ -49,7 +49,7 @@ class Trace:
 
     - before: largest value before the fault, or in a whole healthy flight.
     - records: (delay s, value) of each value since the fault that is larger than all since the fault.
-    - faulted: whether the flight has a fault. healthy_s: time without a fault.
+    - faulted: whether the fault begins in the flight. healthy_s: time until then.
     - rises: (time s, value) of each value before the fault that is larger than all before it.
     """
 

@@ -180,7 +180,7 @@ def write_runs(out: Path, folders: Sequence[Path]) -> list[Run]:
 
 
 def _draw(axes: Any, folder: Path, label: str) -> None:
-    """The tracking errors of a run, at most about 20 000 points of each curve."""
+    """The tracking errors of a run, fewer than 40 000 points of each curve."""
     import numpy as np
 
     from beaver_ftc.results.log import StoredLog

@@ -28,7 +28,8 @@ Results = Sequence[Result]  # of one entry, in the order of the flights
 
 def line_of(entry: Entry, results: Results, oracle: Results, ours: Results = ()) -> Document:
     """The line of one entry over one set. oracle: results of the oracle in the same flights, in the same
-    order. ours: the same of our entry, if it flew.
+    order. ours: the same of our entry, if it flew. Flights that failed with an error are only in `failed` and
+    `against_ours`. ratio: tracking error over that of the oracle, where the oracle has one.
 
     The delay of an event that never comes is infinite. None: there was nothing to count.
     """
@@ -57,8 +58,8 @@ def line_of(entry: Entry, results: Results, oracle: Results, ours: Results = ())
 
 
 def _false_alarms(mine: Results) -> Document:
-    """Number and rate of false alarms, per hour in which an alarm would be false, with the upper bound of the
-    rate."""
+    """Number and rate of false alarms, per hour in which an alarm would be false, with the one-sided upper
+    bound of the rate."""
     alarms = sum(r.false_alarm for r in mine)
     hours = sum(r.fault_free_s for r in mine) / 3600.0
     return {
@@ -91,7 +92,8 @@ def _diagnosis(faulted: Results) -> Document:
 def _duel(entry: Entry, mine: Results, ours: Results) -> Document:
     """In how many flights with a fault an entry is worse or better than ours, and the probability p of a
     result at least as uneven between equals. Schemes are compared by whether the fault is detected, laws by
-    the tracking error."""
+    the tracking error. In a flight that failed with an error, nothing is detected and the error is
+    infinite."""
 
     def badness(result: Result) -> float:
         return result.rms_deg_s if entry.law != LAW else float(result.delay_s == inf)
@@ -207,13 +209,13 @@ def _set_document(trials: Sequence[Trial], entries: Sequence[Entry]) -> Document
     }
 
 
-# Schemes and laws that are no rivals: yardsticks and parts of ours.
+# Schemes and laws that `who_is_better` does not compare: yardsticks and parts of ours.
 YARDSTICKS = ("none", ORACLE, "oracle-published", "fault-tolerant-published")
 
 
 def who_is_better(lines: Sequence[Document]) -> Document:
     """A sentence about the schemes, and one about the laws: the best of them, with intervals and
-    significance."""
+    significance. Empty if no flight has a fault."""
     if not any(row["faults"] for row in lines):
         return {}
     schemes = {row["scheme"]: row for row in lines if row["law"] == LAW and row["scheme"] not in YARDSTICKS}
@@ -229,11 +231,12 @@ def who_is_better(lines: Sequence[Document]) -> Document:
 def leader(
     rows: Mapping[str, Document], ours: str, key: str, what: str, cell: Callable[[float], str], more: bool
 ) -> str:
-    """One sentence that compares the best rival with ours, each number with its interval.
+    """One sentence that compares the best rival with ours, each number with its interval. If their numbers
+    are equal, it names all rivals that equal ours.
 
-    rows: lines by name, each with the duel `against_ours`. ours: begin of our names. key: of the number; the
-    keys `<key>_low` and `<key>_high` are its interval. what: its name. cell: its format. more: whether a
-    larger number is better.
+    rows: lines by name, each with the duel `against_ours`. ours: our name; a name that begins with it is no
+    rival. key: of the number; the keys `<key>_low` and `<key>_high` are its interval. what: its name. cell:
+    its format. more: whether a larger number is better.
     """
     sign = -1.0 if more else 1.0
     badness = {name: inf if row.get(key) is None else sign * row[key] for name, row in rows.items()}
@@ -264,7 +267,8 @@ def leader(
 
 
 def better_than_ours(lines: Sequence[Document], free: Document) -> list[str]:
-    """One sentence for each number in which a rival is better than our scheme or our law.
+    """One sentence for each number in which another scheme or law is better than ours, also one of YARDSTICKS
+    but not the scheme `none` and the law `oracle`.
 
     free: by scheme, the point at its most sensitive level without a false alarm.
     """
@@ -282,8 +286,8 @@ def better_than_ours(lines: Sequence[Document], free: Document) -> list[str]:
 
 
 def _better(row: Document, ours: Document, compared: Mapping[str, str], name: str) -> Iterator[str]:
-    """The sentences of one rival. None is the worst value of each number: an infinite delay, an unknown
-    rate."""
+    """The sentences of one rival. None is the worst value of each number, an infinite delay or an unknown
+    rate, and printed as `never`."""
     for key, name_of_number in compared.items():
         value = row.get(key)
         our_value = ours.get(key)

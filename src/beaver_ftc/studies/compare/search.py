@@ -45,8 +45,8 @@ class Found:
     cost: that of the chosen tie, at most the share `TIE` above the lowest of its last search. A restart
     begins there, so that the cost may rise by as much at each restart.
 
-    restarts: searches after the first. settled: whether the last of them gained nothing; if not, the budget
-    ended the search, and a longer one may find more.
+    restarts: searches after the first, without those in a widened range. settled: whether the last `SETTLED`
+    searches gained nothing; if not, the budget ended the search, and a longer one may find more.
     """
 
     start_cost: float
@@ -73,7 +73,7 @@ def on_scale(range_: Range, value: float) -> float:
 
 
 def value_at(range_: Range, place: float) -> float:
-    """The value at a place (0 to 1) of a range."""
+    """The value at a place of a range, 0 to 1 between its limits; six digits of it on a logarithmic scale."""
     forward, inverse = _SCALES[range_.scale]
     low, high = forward(range_.low), forward(range_.high)
     value = inverse(low + place * (high - low))
@@ -87,15 +87,15 @@ def on_edge(values: Values, ranges: Ranges) -> dict[str, bool]:
 
 
 def search(cost: Cost, ranges: Ranges, start: Values, trials: int, seed: int, restarts: int) -> Found:
-    """The values with the lowest cost. trials: of each search. restarts: the largest number of searches after
-    the first; a search in a widened range does not count. Raises SimulationFailed after WIDENINGS
-    widenings."""
+    """The values with the lowest cost, or a tie of it. trials: of each search. restarts: the largest number
+    of searches after the first; a search in a widened range does not count. Raises SimulationFailed after
+    WIDENINGS widenings."""
     ranges = dict(ranges)
     widened = list[str]()
     values = dict(start)
     cost_now = None
     start_cost = 0.0
-    # tried: trials. widenings: searches that ended on an edge. restarted: restarts. quiet: restarts in a row
+    # tried: trials. widenings: searches that ended on an edge. restarted: restarts. quiet: searches in a row
     # that gained nothing.
     tried = widenings = restarted = quiet = 0
     while True:

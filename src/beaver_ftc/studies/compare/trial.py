@@ -43,7 +43,8 @@ class SetFlight:
 def of_sweep(
     path: str | Path, set_name: str | None = None, most: int | None = None, draw: int = 0
 ) -> list[SetFlight]:
-    """The first `most` flights of a sweep file. Raises BadInput for a wrong file.
+    """The first `most` flights of a sweep file; None is all. Raises BadInput for a wrong file, or one whose
+    base has `changes`.
 
     draw: 0 flies with the seed of the file; each other number flies with another seed, and so other flights.
     """
@@ -74,7 +75,8 @@ def set_names() -> list[str]:
 
 
 def of_set(name: str, most: int | None = None, draw: int = 0) -> list[SetFlight]:
-    """The flights of a standard set: the first `most` of each of its sweeps. draw: as in `of_sweep`."""
+    """The flights of a standard set: the first `most` of each of its sweeps. draw: as in `of_sweep`. Raises
+    BadInput for an unknown set."""
     folder = benchmark_folder() / name
     if not folder.is_dir():
         allowed = ", ".join([*set_names(), *(CALIBRATION + grade for grade in FLIGHT_GRADES)])
@@ -124,7 +126,7 @@ class Result:
 
 @dataclass
 class Trial:
-    """The results of one case of a set. traces: by scheme. failures: for each missing trace, the reason."""
+    """The results of one case of a set. traces: by scheme. failures: the reasons why traces are missing."""
 
     set: str
     results: list[Result] = field(default_factory=list)

@@ -135,8 +135,9 @@ def tune_method(method: Method, how: Search) -> Document:
     """The row of a method: the chosen values, the fields of `Found` (search.py), the number of flights of a
     trial, and the margins of a law.
 
-    On another draw than 0, the row also has the gain of the values found, with the fields of `gain_of`.
-    `flights` is then the number of flights on which both settings are compared.
+    On another draw than 0, the row also has the gain of the values found, with the fields of `gain_of`,
+    unless neither these nor the start are admissible. `flights` is then the number of flights on which both
+    settings are compared.
     """
     flown_on = method.grade, how.most, how.draw, how.draws
     cost = (

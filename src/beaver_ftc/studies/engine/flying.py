@@ -44,8 +44,8 @@ class _Tasks:
         self._losses = Counter[tuple[int, ...]]()
 
     def hand_out(self, workers: Workers) -> None:
-        """Give tasks to workers until all slots are filled. A batch is divided once all tasks of earlier
-        batches are with workers."""
+        """Give tasks to workers until all slots are filled or no task is left. A batch is divided once all
+        tasks of earlier batches are with workers."""
         while self.flying < workers.slots:
             if not self._waiting and (batch := next(self._coming, None)):
                 self._flown[batch.number] = (batch, {})

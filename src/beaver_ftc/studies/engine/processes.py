@@ -1,8 +1,8 @@
 """Processes on this machine: how many, how they are started, their environment, and their output.
 
-Workers are forked from the fork server, a process that has imported all modules they need. These imports take
-half a second. If the server is started early, it imports while this process still reads its input. This
-module imports nothing large.
+Where the system can, workers are forked from the fork server, a process that has imported the modules that
+they need. These imports take half a second. If the server is started early, it imports while this process
+still reads its input. This module imports nothing large.
 """
 
 import contextlib
@@ -42,7 +42,7 @@ def context() -> Any:
 
 
 def start_early() -> None:
-    """Start the fork server, so that it begins its imports."""
+    """Start the fork server, if workers are forked from it, so that it begins its imports."""
     if context().get_start_method() == "forkserver":
         with single_threaded():
             forkserver.ensure_running()

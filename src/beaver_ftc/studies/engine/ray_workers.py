@@ -1,5 +1,5 @@
-"""A Ray cluster as workers. Each task is a Ray task; QUEUED_A_CPU tasks for each CPU are in the queue, so
-that no CPU waits.
+"""A Ray cluster as workers. Each task is a Ray task. Unless a number of workers is requested, QUEUED_A_CPU
+tasks for each CPU are in the queue, so that no CPU waits.
 
 Ray does not retry a lost task: flying.py decides whether it is flown again, as for local processes.
 """
@@ -44,7 +44,8 @@ class RayWorkers:
 
     @property
     def slots(self) -> int:
-        """The number of tasks to submit; it changes with the nodes of the cluster."""
+        """The number of tasks to submit; without a requested number, it changes with the nodes of the
+        cluster."""
         cpus = max(1, int(self._ray.cluster_resources().get("CPU", 1)))
         return self._most or QUEUED_A_CPU * cpus
 
@@ -97,7 +98,8 @@ def fly_task(work: Work, driver_versions: dict[str, str], cases: Sequence[Any]) 
 
 
 def _join(ray: Any, address: str | None) -> bool:
-    """Join the cluster at an address, or start one. False if this process has joined one before."""
+    """Join the cluster at an address, or start one. False if this process has joined one before. Raises
+    BadInput if there is none at this address."""
     if ray.is_initialized():
         return False
     options: dict[str, Any] = {} if address else {"include_dashboard": False}

@@ -1,6 +1,7 @@
 """Bounds, with a confidence, for rates, counts and quantiles that are estimated from a number of flights.
 
-All functions depend on counts or ordered values alone. A bound that the flights do not give is infinite.
+All functions depend on counts or ordered values alone. A bound that the flights do not give is the end of the
+range: 0 or 1 of a share, 0 or infinite of a rate, infinite of a quantile.
 """
 
 import functools

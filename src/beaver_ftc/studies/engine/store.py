@@ -57,7 +57,7 @@ class Parts:
         return rows
 
     def remove(self) -> None:
-        """Remove all parts."""
+        """Remove all parts, and the folder if nothing else is in it."""
         for part in self.folder.glob(f"*{self.codec.suffix}"):
             part.unlink()
         with contextlib.suppress(OSError):

@@ -126,7 +126,8 @@ def _fly_pieces(
 @contextlib.contextmanager
 def _keeping(study: Study, out: Path) -> Iterator[store.Parts]:
     """Yield the parts of a study, in its hidden folder, which is locked. The folder is removed at the end of
-    the block, also if the block raises and no part has landed."""
+    the block. If the block raises, it stays with the parts that have landed; without any, it is removed, and
+    so is `out` if it is new and empty."""
     hidden = out / f".{study.name}.flown"
     is_new = not out.exists()
     with clear_disk_errors(hidden):

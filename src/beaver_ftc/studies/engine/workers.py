@@ -68,7 +68,7 @@ class Work(NamedTuple):
 
 
 class Workers(Protocol):
-    """A backend: several workers that fly tasks."""
+    """A backend: workers that fly tasks."""
 
     @property
     def slots(self) -> int:
@@ -95,6 +95,7 @@ class ThisProcess:
         self._task = task
 
     def outcomes(self, timeout_s: float) -> list[Outcome]:
+        """Fly the task, however long it takes."""
         return [Outcome(self._task, self.work.all(self._task.cases))]
 
     def close(self) -> None:

@@ -19,7 +19,7 @@ HEALTHY_S = 100.0  # no law holds the attitude: a longer flight leaves the valid
 AFTER_FAULT_S = 15.0  # longer than a period of the slowest reference
 _AIRSPEED_MPS = (35.0, 52.0)
 _ALTITUDE_M = (0.0, 3000.0)
-_RATE_HZ = {"healthy": (20, 50), "faulty": (20, 100)}  # low for long healthy flights, to save time
+_RATE_HZ = {"healthy": (20, 50), "faulty": (20, 100)}  # lower for the long healthy flights, to save time
 _MAGNITUDE = (0.05, 1.0)
 _KAPPA_PER_S = (0.2, 10.0)
 _FAULT_AT_S = (3.0, 8.0)
@@ -86,7 +86,8 @@ def _signal(rng: Generator) -> Document:
 
 
 def _within(rng: Generator, bound: float) -> float:
-    """A random size from 0 to the bound, with the probability _AT_THE_BOUND exactly the bound."""
+    """With the probability _AT_THE_BOUND exactly the bound, otherwise a uniformly random size from 0 to
+    it."""
     return bound if rng.random() < _AT_THE_BOUND else rng.uniform(0.0, bound)
 
 

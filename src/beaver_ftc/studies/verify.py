@@ -88,8 +88,8 @@ def _faulty(draw: Draw, schemes: Schemes) -> Row:
 
 
 def judge(flight: Landing) -> Row:
-    """The outcome of a flight with one fault. Delays are in s from the first frame with the fault; late,
-    excluded, wrong: whether a guarantee is violated."""
+    """The outcome of a flight with one fault. Delays are in s from the first frame with the fault;
+    false_alarm, late, excluded, wrong: whether a guarantee is violated."""
     truth = Truth.of(flight.scenario)
     guaranteed_s = flight.guaranteed_delay_s
     alarm_s = flight.detection_time_s
@@ -121,8 +121,8 @@ def _estimate_error(flight: Landing) -> float | None:
 
 
 class Promise(NamedTuple):
-    """A kind of violation. guarantee: G1, G2 or G3. broken: key of an outcome that is true if it is
-    violated."""
+    """A kind of violation. guarantee: G1, G2 or G3. broken: key of an outcome that is true if this guarantee
+    is violated."""
 
     guarantee: str
     broken: str
@@ -181,7 +181,8 @@ def _healthy_document(rows: Sequence[Row]) -> Document:
 
 
 def _scheme(rows: Sequence[Row]) -> Document:
-    """Violations, detections, delays and errors of one scheme. rows: its outcomes."""
+    """Violations, detections, delays and errors of one scheme. rows: its outcomes. delay_over_guaranteed: of
+    the detected faults alone, without a delay of 0 s."""
     n = len(rows)
     counts = {promise: sum(row[kind.broken] for row in rows) for promise, kind in PROMISES.items()}
     certain = [row for row in rows if row["guaranteed_s"] is not None]
@@ -211,7 +212,8 @@ def _quantiles(values: Iterable[float | None]) -> dict[str, float | None]:
 
 
 def _shorter(schemes: Document) -> float | None:
-    """The share by which the sharpened scheme's median delay is shorter than the published one's."""
+    """The share by which the sharpened scheme's median delay is shorter than the published one's; None if one
+    is infinite, or the published one is 0 s."""
     published, sharpened = (schemes[name]["delay_s"]["median"] for name in SCHEMES)
     return 1.0 - sharpened / published if published and sharpened is not None else None
 

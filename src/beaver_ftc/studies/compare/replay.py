@@ -107,9 +107,10 @@ class Recording:
 def record(scenario: Scenario) -> Recording:
     """Fly a scenario under the nominal law and record the arguments of a detector."""
     nominal = scenario.control.model_copy(update={"law": "nominal"})
-    recorder = Recorder()
+    recorder = Recorder()  # only for its context: Notes replaces its steps by compiled frames
     loop = Loop(scenario.model_copy(update={"control": nominal}), recorder)
     try:
+        # the flight with a plug-in has switched them off
         switch_statistical_tests(loop.frames[0], scenario.fdi.statistical is not None)
         notes = Notes(loop)
         for _ in loop.chunks():

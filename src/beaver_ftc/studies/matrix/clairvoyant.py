@@ -41,10 +41,10 @@ def informed_row(scenario: "Scenario", log: Columns, surface: str) -> Document:
     """told_deflection: deflection d of the fault of a surface from its begin to the end of the flight.
     told_chance: the probability of detecting it in this time.
 
-    d: size of phi (n, 3) rad/s2 in the whitened noise, in standard deviations, if the unknown coefficients
-    may add regressors @ c. regressors (n, 3, m) rad/s2 per 1; c (m,) with standard deviations sigma (m,),
-    tolerance / sqrt(3) of an even distribution. If the diagnosis monitors the sensors, d is the smallest
-    value over an error of each gyro.
+    d: size of phi (n, 3) rad/s2, 0 until the fault, in the whitened noise, in standard deviations, if the
+    unknown coefficients may add regressors @ c. regressors (n, 3, m) rad/s2 per 1; c (m,) with standard
+    deviations sigma (m,), tolerance / sqrt(3) of an even distribution. If the diagnosis monitors the sensors,
+    d is the smallest value over an error of each gyro.
     """
     assert scenario.fdi.statistical is not None
     aircraft = scenario.airframe

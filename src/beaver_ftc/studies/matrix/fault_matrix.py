@@ -1,7 +1,7 @@
 """Every fault type on every surface: the verdict of the diagnosis, and the tracking of the flight.
 
-Each case is flown with the fault-tolerant law and with the oracle. A cell of the matrix is a fault on a
-surface, with the worst result over the airspeeds.
+Each case is flown with the laws `fault-tolerant-published` and `oracle-published`. A cell of the matrix is a
+fault on a surface, with the worst result over the airspeeds.
 
     verdict    meaning, the best first
     named      surface and type are right
@@ -42,7 +42,7 @@ AT_S = 12.0  # begin of the fault
 DURATION_S = 30.0
 NAMED = ("surface", "named")  # verdicts with the right surface
 DECLARED = "fault-matrix-declared"  # name of the folder with declared errors, in place of NAME
-LIKELY = 0.5  # the informed test detects a fault with a larger probability
+LIKELY = 0.5  # above this probability, a fault counts as detected by the informed test
 REFERENCE, UNCERTAINTY = SETTING["reference"], SETTING["uncertainty"]
 
 # Name in the table, and keys of the fault. off_deg: a jam at this angle from the trimmed deflection.
@@ -91,7 +91,7 @@ def cases(
 def declared(turbulence: str = "none", aircraft: str = DEFAULT) -> Document:
     """Keys of a scenario with errors of sensors, servos, air and coefficients, all of them declared.
     Coefficients are in turn at the lower and the upper end of their tolerance, if the truth has a factor for
-    them.
+    them. Without any factor, no model error is flown.
     """
     names = adjustable_terms(aircraft)
     factors = {name: 1.0 + (TOLERANCE if i % 2 else -TOLERANCE) for i, name in enumerate(names)}
@@ -238,7 +238,8 @@ def informed_counts(rows: Rows) -> Document:
     """The results of the flights in which the informed test detects the fault with a probability above
     LIKELY.
 
-    named: the right surface is named. type_kept: the right type is named or among the candidates.
+    named: the right surface is named. type_kept: of the detected faults, surface and type are named or not
+    excluded. Of all flights: flights, and detected_but_not_told, those that only the diagnosis detects.
     """
     seen = [row for row in rows if row["told_chance"] > LIKELY]
     named = [row for row in seen if row["verdict"] in NAMED]
@@ -257,7 +258,8 @@ def informed_counts(rows: Rows) -> Document:
 
 
 def _cell(fault: str, surface: str, rows: Rows) -> Document:
-    """The worst results of a fault on a surface over the airspeeds."""
+    """The worst results of a fault on a surface over the airspeeds, and numbers of flights. delay_s: None if
+    one flight has no delay."""
     flights = [row for row in rows if (row["fault"], row["surface"]) == (fault, surface)]
     delays = [row["delay_s"] for row in flights]
     return {
@@ -280,7 +282,8 @@ def _cell(fault: str, surface: str, rows: Rows) -> Document:
 
 
 def _reason(lost: Rows) -> str:
-    """The reason of the loss of the aircraft, from the flights of the oracle."""
+    """The reason of the loss of the aircraft, from the flights of the oracle; if these show none, the signal
+    that diverged in the first flight with our law."""
     beyond_s = max(row["oracle_beyond_s"] for row in lost)
     if beyond_s > 0.0:
         return f"for {beyond_s:.1f} s no deflection could hold the {lost[0]['axis']} rate"

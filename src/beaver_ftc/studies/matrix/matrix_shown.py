@@ -67,7 +67,7 @@ def _table(document: Document) -> tuple[list[str], dict[str, list[Document]]]:
 
 
 def _cell_text(cell: Document) -> str:
-    """Verdict, delay, tracking ratio and marks of a cell."""
+    """Verdict, delay, tracking ratio and marks of a cell, as LEGEND says."""
     delay = "     -" if cell["delay_s"] is None else f"{cell['delay_s']:4.2f} s"
     ratio = "" if cell["ratio"] is None else f"{cell['ratio']:.1f}x"
     unseen = "o" if cell.get("told") == 0 else ""

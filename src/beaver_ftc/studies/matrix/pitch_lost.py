@@ -24,7 +24,7 @@ from beaver_ftc.studies.present.tables import aligned, tabulated
 NAME = "pitch-lost"
 DURATION_S = 100.0
 COLUMNS = ("t_s", "q_rad_s", "theta_rad", "phi_rad", "airspeed_mps", "envelope_valid")
-SETTLED_S = 30.0  # the swing is measured from this time on, when the transient of the faults is over
+SETTLED_S = 30.0  # swing and RMS rate count from this time on, when the transient of the faults is over
 LAWS = ("fault-tolerant-published", "oracle-published")
 
 # Jam of the elevator, deg from its trim (None: it floats), and position of the flap, deg.

@@ -81,13 +81,14 @@ def loop_response(F: np.ndarray, b: np.ndarray, k: np.ndarray) -> np.ndarray:
 
         L = -k (s I - F)^-1 b
 
-    The roots of 1 + L = 0 are the poles of F + b k."""
+    The roots of 1 + L = 0 are the poles of F + b k.
+    """
     s = 1j * FREQUENCIES_RAD_S[:, None, None]
     return -np.linalg.solve(s * np.eye(len(F)) - F, b[:, None])[..., 0] @ k
 
 
 def _phugoid_damping(system: np.ndarray) -> float:
-    """Damping ratio of the slow oscillation; 1 if there is none."""
+    """Smallest damping ratio of the oscillations slower than SLOW_RAD_S; 1 if there is none."""
     poles = np.linalg.eigvals(system)
     slow = poles[(np.abs(poles) < SLOW_RAD_S) & (poles.imag > 1e-6)]
     return float(min(-slow.real / np.abs(slow), default=1.0))

@@ -82,7 +82,7 @@ def test_only_what_is_flown_is_said_to_hold():
 
 def _faulty_row(**sharpened):
     well = {
-        "delay_s": 0.1, "false_alarm": False, "guaranteed_s": 0.2, "late": False, "isolation_s": 0.2,
+        "delay_s": 0.1, "false_alarm": False, "guaranteed_s": 0.2, "late": False, "isolation_delay_s": 0.2,
         "excluded": False, "wrong": False, "estimate_error": 0.01,
     }  # fmt: skip
     return {"index": 0, "published": well, "sharpened": {**well, **sharpened}}

@@ -26,14 +26,14 @@ def landing(at_s=4.995, rate_hz=50.0, **changes):
 def test_delays_count_from_the_first_frame_with_the_fault():
     found = judge(landing(detection_time_s=5.5, isolation_time_s=5.75, isolated="elevator", estimate=-0.45))
     assert found == pytest.approx({
-        "delay_s": 0.5, "false_alarm": False, "guaranteed_s": None, "late": False, "isolation_s": 0.75,
+        "delay_s": 0.5, "false_alarm": False, "guaranteed_s": None, "late": False, "isolation_delay_s": 0.75,
         "excluded": False, "wrong": False, "estimate_error": 0.05,
     })  # fmt: skip
     assert judge(landing(at_s=5.0, detection_time_s=5.5))["delay_s"] == pytest.approx(0.5)
     assert judge(landing(at_s=5.0 + 5e-10, detection_time_s=5.5))["delay_s"] == pytest.approx(0.5)
     assert judge(landing(at_s=5.0 + 5e-9, detection_time_s=5.5))["delay_s"] == pytest.approx(0.48)
     nothing = judge(landing())
-    assert (nothing["delay_s"], nothing["isolation_s"], nothing["estimate_error"]) == (None, None, None)
+    assert (nothing["delay_s"], nothing["isolation_delay_s"], nothing["estimate_error"]) == (None, None, None)
     assert not any(nothing[broken] for broken in ("false_alarm", "late", "excluded", "wrong"))
 
 

@@ -102,7 +102,7 @@ def judge(flight: Landing) -> Row:
         "guaranteed_s": guaranteed_s,
         "late": guaranteed_s is not None
         and (delay_s is None or is_late(delay_s, guaranteed_s, 1.0 / flight.scenario.rate_hz)),
-        "isolation_s": truth.onset.delay_s(flight.isolation_time_s),
+        "isolation_delay_s": truth.onset.delay_s(flight.isolation_time_s),
         "excluded": alarm_s is not None
         and not any(truth.faults[0].is_named_by(name) for name in not_excluded),
         "wrong": flight.isolated is not None and not rightly_named,
@@ -195,10 +195,10 @@ def _scheme(rows: Sequence[Row]) -> Document:
             for name, count in counts.items()
         },
         "detected": sum(row["delay_s"] is not None for row in rows),
-        "isolated": sum(row["isolation_s"] is not None for row in rows),
+        "isolated": sum(row["isolation_delay_s"] is not None for row in rows),
         "detection_certain": len(certain),
         "delay_s": _quantiles(row["delay_s"] for row in rows),
-        "isolation_delay_s": _quantiles(row["isolation_s"] for row in rows),
+        "isolation_delay_s": _quantiles(row["isolation_delay_s"] for row in rows),
         "delay_over_guaranteed": _quantiles(ratios),
         "estimate_error": _quantiles(errors),
     }

@@ -16,8 +16,8 @@ from beaver_ftc.studies.detectability.command import schemes_study
 from beaver_ftc.studies.detectability.probabilities import (
     JUDGED_S,
     document_of,
+    informed_shares,
     level_for,
-    limit,
     rows_of,
     summary,
     title_of,
@@ -173,7 +173,7 @@ class TestCounts:
         levels = {(*STILL, scheme): 2.0 for scheme in "ab"}
         far = watched(2, a=0.1)
         far.deflections = [[100.0] * 3]
-        found = limit(rows_of([watched(1, a=0.7, b=0.7), far], levels), 36.0)
+        found = informed_shares(rows_of([watched(1, a=0.7, b=0.7), far], levels), 36.0)
         assert found["1"] == pytest.approx(0.5 * detection_probability(2.0, 1.0, 36.0) + 0.5)
 
     def test_flights_of_a_seed_count_once(self):

@@ -10,7 +10,7 @@ import beaver_ftc as bf
 from beaver_ftc.cli.main import app
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.studies.detectability import sizes as survey
-from beaver_ftc.studies.detectability.sizes import Asked, Flight, check, fly_one, variants_of
+from beaver_ftc.studies.detectability.sizes import Flight, Request, check, fly_one, variants_of
 
 STAGES = (36,)  # the fewest of which an order statistic bounds the 0.9 quantile from above
 SCENARIO = {
@@ -22,7 +22,7 @@ EVERYTHING = {
     "actuators": "servo",
     "fdi": {"bounds": {"turbulence": "light", "sensors": "tactical-grade", "deflection_deg": 0.1}},
 }  # fmt: skip
-ASKED = Asked("elevator", 0.5, seed=3)
+REQUEST = Request("elevator", 0.5, seed=3)
 COMPARED = ("as it is", "without uncertainty of the model")
 
 
@@ -107,7 +107,7 @@ NOTHING = {
 def test_a_row_says_what_was_measured_up_to_the_time_asked_for(told, flight, row):
     told(**flight)
     variants = dict(variants_of(bf.load(SCENARIO), "elevator"))
-    assert fly_one(variants, ASKED, Flight("as it is", 1, 60)) == NOTHING | row
+    assert fly_one(variants, REQUEST, Flight("as it is", 1, 60)) == NOTHING | row
 
 
 def test_a_document_and_its_files(few, tmp_path):
@@ -130,14 +130,14 @@ def test_a_document_and_its_files(few, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("changes", "asked", "says"),
+    ("changes", "wanted", "says"),
     [
-        ({}, Asked("elevater", 0.5), "--surface 'elevater': allowed: aileron, elevator, rudder, flap"),
-        ({"fdi": {"scheme": "none"}}, ASKED, "scheme: none diagnoses nothing"),
-        ({"duration_s": 2.95}, ASKED, "sines: duration_s: too short for --within, allowed: 3 or more"),
+        ({}, Request("elevater", 0.5), "--surface 'elevater': allowed: aileron, elevator, rudder, flap"),
+        ({"fdi": {"scheme": "none"}}, REQUEST, "scheme: none diagnoses nothing"),
+        ({"duration_s": 2.95}, REQUEST, "sines: duration_s: too short for --within, allowed: 3 or more"),
     ],
 )
-def test_what_cannot_be_answered_is_a_line(changes, asked, says):
+def test_what_cannot_be_answered_is_a_line(changes, wanted, says):
     with pytest.raises(BadInput, match=says):
-        check(bf.load(SCENARIO | changes), asked)
-    check(bf.load(SCENARIO), ASKED)  # just long enough: 2 s to settle, twice 0.5 s
+        check(bf.load(SCENARIO | changes), wanted)
+    check(bf.load(SCENARIO), REQUEST)  # just long enough: 2 s to settle, twice 0.5 s

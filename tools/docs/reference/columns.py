@@ -58,7 +58,7 @@ def tables() -> dict[str, Columns]:
     rows = LogRows(no_rows, no_rows, no_rows, no_surfaces, no_surfaces, no_surfaces, no_rows, no_rows)
     names = {
         "detectability-grid": probabilities.COLUMNS,
-        "detectability": (*places.COLUMNS, *places.PAIRS),
+        "detectability": (*places.POINT_COLUMNS, *places.PAIR_COLUMNS),
         "mismatch": (*study.PLACE, *study.FIGURES),
         "mismatch-frames": split.COLUMNS,
         "diagnosis": rows.table(["SURFACE"], with_probability=True),

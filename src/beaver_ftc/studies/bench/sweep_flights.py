@@ -18,7 +18,7 @@ from beaver_ftc.studies.sweep.sampling import Assignment, Plan
 
 STAGES = ("scenario", "aircraft, trim, record", "frames", "metrics and row")
 # Times of STAGES (4,), s; JSBSim frames; time of as many frames of JSBSim alone, s.
-Taken = tuple[np.ndarray, int, float]
+Times = tuple[np.ndarray, int, float]
 
 
 class Kind(NamedTuple):
@@ -67,14 +67,14 @@ def by_kind(rounds: int) -> dict[str, Document]:
         frame_us, own_part_us          the stage `frames` for each JSBSim frame; the same less JSBSim
     """
     sweeps = {name: load_sweep(kind.sweep) for name, kind in KINDS.items()}
-    taken: dict[str, list[Taken]] = {name: [] for name in KINDS}
+    times_of_kind: dict[str, list[Times]] = {name: [] for name in KINDS}
     for run in (0, *range(rounds)):  # the first is the warm-up
         for name, kind in KINDS.items():
-            taken[name].append(_flown(sweeps[name], kind, run))
-    return {name: _medians(rows[1:]) for name, rows in taken.items()}
+            times_of_kind[name].append(_flown(sweeps[name], kind, run))
+    return {name: _medians(rows[1:]) for name, rows in times_of_kind.items()}
 
 
-def _flown(sweep: Sweep, kind: Kind, run: int) -> Taken:
+def _flown(sweep: Sweep, kind: Kind, run: int) -> Times:
     """The times of one flight, with all that `sweep` does for it. The trim is computed within the second
     stage; if all flights of a kind begin alike, before the timing.
     """
@@ -117,7 +117,7 @@ def _landed(loop: Loop, assignment: Assignment) -> Landing:
     return flight
 
 
-def _medians(rows: list[Taken]) -> Document:
+def _medians(rows: list[Times]) -> Document:
     """The document of a kind, from the times in all rounds."""
     parts, runs, bare_s = (np.array(column) for column in zip(*rows, strict=True))
     frames_s = parts[:, STAGES.index("frames")]

@@ -33,35 +33,35 @@ def line_of(entry: Entry, results: Results, oracle: Results, ours: Results = ())
 
     The delay of an event that never comes is infinite. None: there was nothing to count.
     """
-    completed = [(mine, best) for mine, best in zip(results, oracle, strict=True) if mine.error is None]
-    mine = [result for result, _ in completed]
-    faulted = [result for result in mine if result.faulted]
-    ratios = [m.rms_deg_s / o.rms_deg_s for m, o in completed if o.error is None and 0 < o.rms_deg_s < inf]
+    pairs = [(mine, best) for mine, best in zip(results, oracle, strict=True) if mine.error is None]
+    completed = [mine for mine, _ in pairs]
+    faulted = [result for result in completed if result.faulted]
+    ratios = [m.rms_deg_s / o.rms_deg_s for m, o in pairs if o.error is None and 0 < o.rms_deg_s < inf]
     return {
         **vars(entry),
-        "flights": len(mine),
-        "failed": len(results) - len(mine),
-        **_false_alarms(mine),
+        "flights": len(completed),
+        "failed": len(results) - len(completed),
+        **_false_alarms(completed),
         **_diagnosis(faulted),
         **_spread("ratio", ratios),
         **_interval("ratio_median", ratios),
         "detected": sum(r.delay_s < inf for r in faulted),
         "isolated": sum(r.correct for r in faulted),
-        "departures": sum(r.departed for r in mine),
-        "us": middle(r.us for r in mine) if mine else 0.0,
-        **_spread("before", [r.before_deg_s for r in mine]),
+        "departures": sum(r.departed for r in completed),
+        "us": middle(r.us for r in completed) if completed else 0.0,
+        **_spread("before", [r.before_deg_s for r in completed]),
         **_spread("after", [r.after_deg_s for r in faulted]),
-        **_spread("travel", [r.travel_deg_s for r in mine], ("median",)),
-        **_spread("energy", [r.energy_deg2_s2 for r in mine], ("median",)),
+        **_spread("travel", [r.travel_deg_s for r in completed], ("median",)),
+        **_spread("energy", [r.energy_deg2_s2 for r in completed], ("median",)),
         "against_ours": _duel(entry, results, ours),
     }
 
 
-def _false_alarms(mine: Results) -> Document:
+def _false_alarms(completed: Results) -> Document:
     """Number and rate of false alarms, per hour in which an alarm would be false, with the one-sided upper
     bound of the rate."""
-    alarms = sum(r.false_alarm for r in mine)
-    hours = sum(r.fault_free_s for r in mine) / 3600.0
+    alarms = sum(r.false_alarm for r in completed)
+    hours = sum(r.fault_free_s for r in completed) / 3600.0
     return {
         "false_alarms": alarms,
         "healthy_h": hours,

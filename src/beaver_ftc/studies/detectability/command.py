@@ -35,7 +35,7 @@ from beaver_ftc.studies.detectability import (
 )
 from beaver_ftc.studies.detectability.schemes import GRIDS, Grid, Watched
 from beaver_ftc.studies.detectability.shown import NAME
-from beaver_ftc.studies.detectability.sizes import Asked, sizes_study
+from beaver_ftc.studies.detectability.sizes import Request, sizes_study
 from beaver_ftc.studies.engine.study import Study, run_into
 from beaver_ftc.studies.present.page import as_text
 
@@ -124,8 +124,8 @@ class Detectability(StudyCommand):
         if self.aircraft is not None:
             scenario = places.with_aircraft(scenario, self.aircraft)
         if self.within is not None:
-            asked = Asked(str(self.surface), self.within, self.seed)
-            return run_into(sizes_study(scenario, asked, reporter.say), self.out, self.processes)
+            request = Request(str(self.surface), self.within, self.seed)
+            return run_into(sizes_study(scenario, request, reporter.say), self.out, self.processes)
         return self._of_places(scenario, reporter)
 
     def _refuse_contradictions(self) -> None:

@@ -33,9 +33,9 @@ SHARES = (0.9, 1.0, 1.1)  # of the usual airspeed of another aircraft
 EXCITATIONS = (0.25, 0.5, 1.0, 2.0)  # factors on the references of the scenario
 PLACE = ("airspeed_mps", "altitude_m", "excitation")
 TOO_SHORT = "the flight ends before a fault could be isolated"
-COLUMNS = (*PLACE, "fault", *MAGNITUDES, "confused_with", "why")
 PARTS = ("points", "pairs")  # of the document: rows for each fault, and for each fault and other fault
-PAIRS = (*PLACE, "fault", "other", *isolability.LOSS_COLUMNS, *isolability.DOUBLET_COLUMNS)
+POINT_COLUMNS = (*PLACE, "fault", *MAGNITUDES, "confused_with", "why")
+PAIR_COLUMNS = (*PLACE, "fault", "other", *isolability.LOSS_COLUMNS, *isolability.DOUBLET_COLUMNS)
 
 
 def places_study(

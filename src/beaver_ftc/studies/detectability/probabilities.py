@@ -102,7 +102,7 @@ def summary(rows: Rows, own: bool = False) -> Document:
     }
 
 
-def limit(rows: Rows, per_h: float) -> Document:
+def informed_shares(rows: Rows, per_h: float) -> Document:
     """Mean probability that an informed test detects the faults of these flights, within each of WITHIN_S.
     per_h: its rate of false alarms."""
     row_of_flight = {
@@ -156,7 +156,7 @@ def document_of(grid: Grid, healthy: Sequence[Watched], faulted: Sequence[Watche
             rows, (*PLACE, "scheme"), lambda group: summary(group) | {"own_level": summary(group, own=True)}
         ),
         "cells": _lines(rows, CELL, summary),
-        "limits": _lines(rows, PLACE, lambda group: {"within": limit(group, grid.per_h)}),
+        "limits": _lines(rows, PLACE, lambda group: {"within": informed_shares(group, grid.per_h)}),
         "comparison": _comparison(rows),
         "failures": failures,
         "versions": dict(versions()),

@@ -15,7 +15,7 @@ from beaver_ftc.studies.detectability.probabilities import (
     JUDGED_S,
     SIGNIFICANT,
     Row,
-    limit,
+    informed_shares,
     summary,
     title_of,
 )
@@ -191,12 +191,12 @@ def _draw(panel: "Axes", rows: Sequence[Row], names: Sequence[str], document: Do
     apart = 0.6 / len(magnitudes)
     for place, magnitude in enumerate(magnitudes):
         rows_of_magnitude = [row for row in rows if row["magnitude"] == magnitude]
-        cells = {scheme: summary(of) for (scheme,), of in grouped(rows_of_magnitude, "scheme").items()}
+        cells = {scheme: summary(group) for (scheme,), group in grouped(rows_of_magnitude, "scheme").items()}
         shares = {scheme: cell["within"][within] for scheme, cell in cells.items() if cell["flights"]}
         if rows_of_magnitude:
-            informed = limit(rows_of_magnitude, document["false_alarms_per_h"])[within]
+            informed = informed_shares(rows_of_magnitude, document["false_alarms_per_h"])[within]
             shares[INFORMED] = {"value": informed, "low": informed, "high": informed}
-        lines = [names.index(of) + apart * (place - 0.5 * (len(magnitudes) - 1)) for of in shares]
+        lines = [names.index(name) + apart * (place - 0.5 * (len(magnitudes) - 1)) for name in shares]
         draw_estimates(
             panel, lines, [*shares.values()], 100.0, across=True, linestyle="none", marker=marker(place),
             markersize=4.5, color=SERIES[place], elinewidth=1.0, clip_on=False,

@@ -46,7 +46,7 @@ FIRST = STAGES[:1]  # number of flights of a comparison, and of the size that is
 
 
 @dataclass(frozen=True)
-class Asked:
+class Request:
     """The request. surface: loses effectiveness. within_s: longest time from the loss to the alarm, s. seed:
     of all random draws."""
 
@@ -86,50 +86,50 @@ class _Flown:
         return [row[key] for row in self.rows_of(variant, runs, size)]
 
 
-def sizes_study(scenario: Scenario, asked: Asked, tell: Callable[[str], None]) -> Study:
+def sizes_study(scenario: Scenario, request: Request, tell: Callable[[str], None]) -> Study:
     """The study of a scenario and surface. tell: takes a line for each round. Raises BadInput for a scenario
     that cannot answer the request."""
-    check(scenario, asked)
-    variants = dict(variants_of(scenario, asked.surface))
+    check(scenario, request)
+    variants = dict(variants_of(scenario, request.surface))
     return Study(
-        f"{scenario.name[:70]}-{NAME}-{asked.surface}", (), partial(fly_one, variants, asked),
-        document=dict, files=sizes_shown.FILES, follows_from=[scenario, asked],
+        f"{scenario.name[:70]}-{NAME}-{request.surface}", (), partial(fly_one, variants, request),
+        document=dict, files=sizes_shown.FILES, follows_from=[scenario, request],
         lost=lambda flight, why: _row(failed=True),
-        rounds=lambda fly: _document(scenario, asked, variants, _Flown(fly, tell)),
+        rounds=lambda fly: _document(scenario, request, variants, _Flown(fly, tell)),
     )  # fmt: skip
 
 
-def check(scenario: Scenario, asked: Asked) -> None:
+def check(scenario: Scenario, request: Request) -> None:
     """Raise BadInput if the surface is unknown, nothing is diagnosed, or the flight is too short."""
     surfaces = scenario.airframe.surfaces
-    if asked.surface not in surfaces:
-        raise BadInput(f"--surface {asked.surface!r:.60}: allowed: {', '.join(surfaces)}")
+    if request.surface not in surfaces:
+        raise BadInput(f"--surface {request.surface!r:.60}: allowed: {', '.join(surfaces)}")
     if scenario.fdi.scheme == "none":
         raise BadInput(f"{scenario.name}: fdi.scheme: none diagnoses nothing, allowed: a scheme")
-    shortest_s = SETTLED_S + 2.0 * asked.within_s  # the begins are then spread over at least within_s
+    shortest_s = SETTLED_S + 2.0 * request.within_s  # the begins are then spread over at least within_s
     if scenario.duration_s < shortest_s:
         raise BadInput(
             f"{scenario.name}: duration_s: too short for --within, allowed: {shortest_s:g} or more"
         )
 
 
-def fly_one(variants: dict[str, Scenario], asked: Asked, flight: Flight) -> Document:
+def fly_one(variants: dict[str, Scenario], request: Request, flight: Flight) -> Document:
     """The row of a flight, which ends two frames after the requested time. bound_used: largest |residual| /
     threshold of all filters before the loss."""
     scenario = variants[flight.variant]
-    draws = np.random.default_rng([asked.seed, flight.run])
+    draws = np.random.default_rng([request.seed, flight.run])
     seed = int(draws.integers(2**31))
-    frames = round(draws.uniform(SETTLED_S, scenario.duration_s - asked.within_s) * scenario.rate_hz)
+    frames = round(draws.uniform(SETTLED_S, scenario.duration_s - request.within_s) * scenario.rate_hz)
     at_s = frames / scenario.rate_hz
-    fault = loss(asked.surface, flight.size / LARGEST, at_s)
+    fault = loss(request.surface, flight.size / LARGEST, at_s)
     faulted = scenario.with_({"seed": seed, "faults": [fault], "expect": {}})
-    end_s = min(at_s + asked.within_s + 2.0 / scenario.rate_hz, scenario.duration_s)
+    end_s = min(at_s + request.within_s + 2.0 / scenario.rate_hz, scenario.duration_s)
     try:
         landing = fly(faulted.model_copy(update={"duration_s": end_s}))
         metrics = measure(landing)
     except BeaverFtcError:
         return _row(failed=True)
-    within_s = asked.within_s + TIME_TOLERANCE_S
+    within_s = request.within_s + TIME_TOLERANCE_S
     detection = metrics.detection
     return _row(
         found=or_never(detection.delay_s) <= within_s,
@@ -193,7 +193,7 @@ def _other_references(scenario: Scenario, surface: str) -> Iterator[tuple[str, D
 _FREQUENCIES = ("frequency_hz", "start_frequency_hz", "end_frequency_hz")
 
 
-def _document(scenario: Scenario, asked: Asked, variants: dict[str, Scenario], flown: _Flown) -> Document:
+def _document(scenario: Scenario, request: Request, variants: dict[str, Scenario], flown: _Flown) -> Document:
     """Fly all variants; the answer for the scenario as it is, and under `compared` those for the others.
     inconclusive, bound_used: of the flights of the scenario as it is."""
     answer = _answer(AS_IT_IS, flown, STAGES)
@@ -202,12 +202,12 @@ def _document(scenario: Scenario, asked: Asked, variants: dict[str, Scenario], f
     reasons = sorted({row["inconclusive"] for row in rows} - {None})
     return {
         "scenario": scenario.name,
-        "surface": asked.surface,
+        "surface": request.surface,
         "type": "loss_of_effectiveness",
-        "within_s": asked.within_s,
+        "within_s": request.within_s,
         "share": SHARE,
         "confidence": CONFIDENCE,
-        "seed": asked.seed,
+        "seed": request.seed,
         **answer,
         "compared": compared,
         "inconclusive": reasons,

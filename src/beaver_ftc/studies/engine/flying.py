@@ -51,7 +51,7 @@ class _Tasks:
                 self._flown[batch.number] = (batch, {})
                 size = max(1, math.ceil(self._left / (workers.slots * TASKS_A_SLOT)))
                 self._left -= len(batch.cases)
-                self._waiting.extend(_apart(batch, size))
+                self._waiting.extend(_divided(batch, size))
             if not self._waiting:
                 return
             workers.submit(self._waiting.popleft())
@@ -76,11 +76,11 @@ class _Tasks:
         if len(key) == 1 and self._losses[key] >= MOST_LOSSES:
             return [self._lost(task.cases[0], LOST)]
         size = 1 if self._losses[key] > 1 else len(key)
-        self._waiting.extendleft(reversed(_apart(task, size)))
+        self._waiting.extendleft(reversed(_divided(task, size)))
         return []
 
 
-def _apart(batch: Batch, size: int) -> list[Batch]:
+def _divided(batch: Batch, size: int) -> list[Batch]:
     """Divide a batch into tasks of so many cases."""
     parts = [slice(i, i + size) for i in range(0, len(batch.runs), size)]
     return [Batch(batch.number, batch.runs[part], batch.cases[part]) for part in parts]
@@ -92,13 +92,13 @@ class Flying:
 
     - landed: from the number and runs of a batch to its rows; None if it has not landed.
     - land: keeps the rows of a batch.
-    - make: makes workers for so many cases; it is called when the first batch is missing.
+    - make_workers: makes workers for so many cases; it is called when the first batch is missing.
     - lost: makes the row of a case that kills its process.
     """
 
     landed: Callable[[Number, Sequence[int]], Any]
     land: Callable[[Number, Any], None]
-    make: Callable[[int], Workers]
+    make_workers: Callable[[int], Workers]
     lost: Lost
     _workers: Workers | None = None
 
@@ -132,7 +132,7 @@ class Flying:
         cases = sum(map(len, missing.values()))
         coming = (Batch(number, runs, cases_of(runs)) for number, runs in missing.items())
         tasks = _Tasks(coming, cases, self.lost)
-        workers = self._workers = self._workers or self.make(cases)
+        workers = self._workers = self._workers or self.make_workers(cases)
         while True:
             if not stopped():
                 tasks.hand_out(workers)

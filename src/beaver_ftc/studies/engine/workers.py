@@ -108,7 +108,9 @@ class _Worker:
     def __init__(self, work: Work) -> None:
         for pause_s in STARTS_AFTER_S:
             time.sleep(pause_s)
-            self._pool = ProcessPoolExecutor(1, mp_context=context(), initializer=_begin, initargs=(work,))
+            self._pool = ProcessPoolExecutor(
+                1, mp_context=context(), initializer=_become_worker, initargs=(work,)
+            )
             with contextlib.suppress(EOFError, ConnectionError):  # the fork server was killed: try again
                 self.pid = self._started()
                 return
@@ -198,17 +200,17 @@ class LocalWorkers:
         return Outcome(task, rows)
 
 
-_OF_THIS_PROCESS: list[Work] = []  # in a worker process, its work
+_WORK: list[Work] = []  # in a worker process, its work
 
 
-def _begin(work: Work) -> None:
+def _become_worker(work: Work) -> None:
     """Make this process a worker: without output and Ctrl-C of the terminal, ending with its parent, and
     warm."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent, which ends its workers
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     threading.Thread(target=_end_with_parent, daemon=True).start()
     silence_this_process()
-    _OF_THIS_PROCESS[:] = [work]
+    _WORK[:] = [work]
     if work.warm_up:
         work.warm_up()
 
@@ -222,4 +224,4 @@ def _end_with_parent() -> None:
 
 
 def _fly(cases: Sequence[Any]) -> list[Row]:
-    return _OF_THIS_PROCESS[0].all(cases)
+    return _WORK[0].all(cases)

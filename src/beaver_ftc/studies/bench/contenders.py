@@ -1,4 +1,4 @@
-"""The contenders that are timed: each flies the same seconds of the same flight, from the same state."""
+"""The contenders that are timed: each flies as many frames from the same state of the aircraft."""
 
 import gc
 import time

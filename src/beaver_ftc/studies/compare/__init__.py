@@ -1,5 +1,4 @@
-"""The same flights for every scheme and law: who raises false alarms, who sees the fault, how soon, at what
-cost."""
+"""The same flights for every scheme and law: false alarms, detections, delays, tracking errors and costs."""
 
 from typing import TYPE_CHECKING
 

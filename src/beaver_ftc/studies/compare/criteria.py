@@ -112,7 +112,7 @@ def fly_entry(case: SetFlight, entry: Entry, group: str, values: Values) -> Resu
     try:
         return result_of(fly(scenario, watch=watch), entry, 0.0)
     except _FalseAlarm:
-        return Result(entry, True, 0.0, bool(scenario.faults))
+        return Result(entry, false_alarm=True, fault_free_s=0.0, faulted=bool(scenario.faults))
 
 
 class Cost:

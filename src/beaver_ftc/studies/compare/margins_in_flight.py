@@ -40,7 +40,7 @@ def margins_of(scenario: Scenario) -> list[Margin]:
         return [  # `closed_form.at` yields the margins of the healthy aircraft ("none") before all others
             margin
             for flight in flights
-            for margin in takewhile(lambda each: each.fault == "none", closed_form.at(flight))
+            for margin in takewhile(lambda row: row.fault == "none", closed_form.at(flight))
         ]
     return [margin for flight in flights for margin in _measured(flight)]
 

@@ -221,24 +221,26 @@ def who_is_better(lines: Sequence[Document]) -> Document:
     schemes = {row["scheme"]: row for row in lines if row["law"] == LAW and row["scheme"] not in YARDSTICKS}
     laws = {row["law"]: row for row in lines if row["scheme"] == SCHEME and row["law"] not in YARDSTICKS}
     return {
-        "schemes": leader(schemes, SCHEME, "detection_rate", "Faults detected", percent, more=True),
+        "schemes": leader(schemes, SCHEME, "detection_rate", "Faults detected", percent, more_is_better=True),
         "laws": leader(
-            laws, LAW, "ratio_median", "Tracking error over the oracle's, median", "{:.2f}".format, False
+            laws, LAW, "ratio_median", "Tracking error over the oracle's, median", "{:.2f}".format,
+            more_is_better=False,
         ),
-    }
+    }  # fmt: skip
 
 
 def leader(
-    rows: Mapping[str, Document], ours: str, key: str, what: str, cell: Callable[[float], str], more: bool
-) -> str:
+    rows: Mapping[str, Document], ours: str, key: str, title: str, cell: Callable[[float], str],
+    more_is_better: bool,
+) -> str:  # fmt: skip
     """One sentence that compares the best rival with ours, each number with its interval. If their numbers
     are equal, it names all rivals that equal ours.
 
     rows: lines by name, each with the duel `against_ours`. ours: our name; a name that begins with it is no
-    rival. key: of the number; the keys `<key>_low` and `<key>_high` are its interval. what: its name. cell:
-    its format. more: whether a larger number is better.
+    rival. key: of the number; the keys `<key>_low` and `<key>_high` are its interval. title: its name. cell:
+    its format.
     """
-    sign = -1.0 if more else 1.0
+    sign = -1.0 if more_is_better else 1.0
     badness = {name: inf if row.get(key) is None else sign * row[key] for name, row in rows.items()}
 
     def text_of(name: str) -> str:
@@ -251,17 +253,17 @@ def leader(
 
     rivals = [name for name in rows if not name.startswith(ours)]
     if not rivals:
-        return f"{what}: {text_of(ours)}."
+        return f"{title}: {text_of(ours)}."
     best = min(rivals, key=badness.__getitem__)
     if badness[best] == badness[ours]:
         equals = [name for name in rivals if badness[name] == badness[ours]]
-        return f"{what}: {ours} and {', '.join(equals)} are equally good: {text_of(ours)}."
+        return f"{title}: {ours} and {', '.join(equals)} are equally good: {text_of(ours)}."
     duel = rows[best]["against_ours"]
     wins = {best: duel["better"], ours: duel["worse"]}
     first, second = sorted(wins, key=badness.__getitem__)
     doubt = "" if duel["p"] < SIGNIFICANT else ", so this may be chance"
     return (
-        f"{what}: {text_of(first)} is better than {text_of(second)}; wins: {wins[first]} against "
+        f"{title}: {text_of(first)} is better than {text_of(second)}; wins: {wins[first]} against "
         f"{wins[second]}, p = {duel['p']:.2g}{doubt}."
     )
 

@@ -117,8 +117,9 @@ def search(cost: Cost, ranges: Ranges, start: Values, trials: int, seed: int, re
         quiet = 0 if gains else quiet + 1
         if quiet == SETTLED or restarted == restarts:
             return Found(
-                start_cost, cost_now, values, ranges, tuple(widened), tried, restarted, quiet == SETTLED
-            )
+                start_cost, cost_now, values, ranges, tuple(widened), trials=tried, restarts=restarted,
+                settled=quiet == SETTLED,
+            )  # fmt: skip
         restarted += 1
 
 

@@ -158,12 +158,12 @@ def with_entry(scenario: Scenario, entry: Entry, chosen: TunedValuesByGrade | No
     grade = grade_of(scenario)
     for group, name, options in ((DETECTORS, entry.scheme, scheme_options), (LAWS, entry.law, law_options)):
         values = tuned_values(chosen or {}, grade, group, name)
-        tuned = {k: v for k, v in values.items() if k not in options and not _says(scenario, k, group)}
+        tuned = {k: v for k, v in values.items() if k not in options and not _is_set(scenario, k, group)}
         changed = with_values(changed, group, tuned)
     return changed
 
 
-def _says(scenario: Scenario, key: str, group: str) -> bool:
+def _is_set(scenario: Scenario, key: str, group: str) -> bool:
     """Whether the scenario itself sets a parameter. Only a key with dots, such as
     `fdi.statistical.misnaming`, can be set there."""
     name = "fdi" if group == DETECTORS else "control"
@@ -230,7 +230,9 @@ def _fly(scenario: Scenario, entry: Entry, chosen: TunedValuesByGrade) -> Result
         loop.release()
         return result_of(flight, entry, 1e6 * flown_s / flight.frames)
     except BeaverFtcError as error:
-        return Result(entry, False, 0.0, bool(scenario.faults), error=str(error))
+        return Result(
+            entry, false_alarm=False, fault_free_s=0.0, faulted=bool(scenario.faults), error=str(error)
+        )
 
 
 def result_of(flight: Landing, entry: Entry, us: float) -> Result:

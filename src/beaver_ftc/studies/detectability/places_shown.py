@@ -157,7 +157,7 @@ def draw_pairs(document: Document) -> "Figure":
             values[at] = np.nan if None in at_half else max(at_half)
             texts[at] = "\n".join(reversed(_spans(places, "magnitude").values())), "black"
         look: dict[str, Any] = {"cmap": "viridis_r", "vmin": 0.0, "vmax": 1.0, "alpha": 0.6}
-        image = heat_map(axes, values, texts, faults, faults, 7, **look)
+        image = heat_map(axes, values, texts, faults, faults, fontsize=7, **look)
         axes.set_title(_times(scale), fontsize=9)
     label_edges(grid, "taken for", ["loss of"])
     figure.colorbar(image, ax=grid, label="smallest loss (half), share", shrink=0.6)

@@ -170,11 +170,12 @@ def title_of(sensors: str, turbulence: str) -> str:
     return f"{sensors} sensors, {air}"
 
 
-def _lines(rows: Rows, names: Sequence[str], what: Callable[[Rows], Document]) -> list[Document]:
-    """A line for each group of rows with the same values in these columns: the values, and `what` of the
-    group."""
+def _lines(rows: Rows, names: Sequence[str], summarise: Callable[[Rows], Document]) -> list[Document]:
+    """A line for each group of rows with the same values in these columns: the values, and what `summarise`
+    makes of the group."""
     return [
-        {**dict(zip(names, key, strict=True)), **what(group)} for key, group in grouped(rows, *names).items()
+        {**dict(zip(names, key, strict=True)), **summarise(group)}
+        for key, group in grouped(rows, *names).items()
     ]
 
 

@@ -106,7 +106,9 @@ def who_is_better(
                 }
                 rows[scheme] = rates | {"against_ours": duel}
         if BOTH in rows:
-            yield leader(rows, BOTH, "rate", f"{surface}, found within {soon} s", percent, more=True)
+            yield leader(
+                rows, BOTH, "rate", f"{surface}, found within {soon} s", percent, more_is_better=True
+            )
 
 
 def comparison(document: Document) -> list[str]:

@@ -92,7 +92,7 @@ def sizes_study(scenario: Scenario, request: Request, tell: Callable[[str], None
     check(scenario, request)
     variants = dict(variants_of(scenario, request.surface))
     return Study(
-        f"{scenario.name[:70]}-{NAME}-{request.surface}", (), partial(fly_one, variants, request),
+        f"{scenario.name[:70]}-{NAME}-{request.surface}", cases=(), fly=partial(fly_one, variants, request),
         document=dict, files=sizes_shown.FILES, follows_from=[scenario, request],
         lost=lambda flight, why: _row(failed=True),
         rounds=lambda fly: _document(scenario, request, variants, _Flown(fly, tell)),
@@ -114,8 +114,8 @@ def check(scenario: Scenario, request: Request) -> None:
 
 
 def fly_one(variants: dict[str, Scenario], request: Request, flight: Flight) -> Document:
-    """The row of a flight, which ends two frames after the requested time. bound_used: largest |residual| /
-    threshold of all filters before the loss."""
+    """The row of a flight, which ends two frames after the requested time or with the scenario. bound_used:
+    largest |residual| / threshold of all filters before the loss."""
     scenario = variants[flight.variant]
     draws = np.random.default_rng([request.seed, flight.run])
     seed = int(draws.integers(2**31))

@@ -21,21 +21,22 @@ PACKAGE = Path(__file__).resolve().parents[2]
 NO_ROWS = ("cli", "commands", "pytest_plugin")
 
 
-def of_request(what: str, asked: Document) -> Document:
-    """The identity of a study. what: `study` or `sweep`, the key of the resolved request `asked`. It also has
-    the versions of the packages of this machine, and the fingerprint of the code."""
-    document = {what: asked, "versions": {**versions(), **plug_ins(), "flight code": fingerprint()}}
+def of_request(kind: str, request: Document) -> Document:
+    """The identity of a study. kind: `study` or `sweep`, the key of the resolved request. The identity also
+    has the versions of the packages of this machine, and the fingerprint of the code."""
+    document = {kind: request, "versions": {**versions(), **plug_ins(), "flight code": fingerprint()}}
     return json.loads(json.dumps(document))
 
 
-def read_identity(manifest: Path, what: str) -> Document | None:
-    """The identity of a `what` in a file; None if the file does not exist or is damaged."""
+def read_identity(manifest: Path, kind: str) -> Document | None:
+    """The identity of a study or sweep, its kind, in a file; None if the file does not exist or is
+    damaged."""
     try:
         document = read_json(manifest)
-        is_one = isinstance(document[what], dict) and isinstance(document["versions"], dict)
+        is_identity = isinstance(document[kind], dict) and isinstance(document["versions"], dict)
     except (OSError, ValueError, KeyError, TypeError):
         return None
-    return document if is_one else None
+    return document if is_identity else None
 
 
 def refuse_other(mine: Document, theirs: Document, folder: Path) -> None:

@@ -104,6 +104,7 @@ def quantile(ordered: np.ndarray, q: float) -> float:
     exceed."""
     if not ordered.size:
         return math.nan
+    # 1e-9: rounding must not lift a whole number q n to the next one
     return float(ordered[max(0, math.ceil(q * ordered.size - 1e-9) - 1)])
 
 

@@ -7,6 +7,7 @@ same command reads them there and flies the other cases. The folder is removed w
     Study       what to fly, and what to make of the rows
     _keeping    the hidden folder, locked, for this study alone
     flown       all rows: flying.py flies the cases that are missing, store.py keeps them
+    piece       a batch of cases, whose rows are one part, that is one file
 """
 
 import contextlib

@@ -3,13 +3,13 @@
 import pytest
 
 from beaver_ftc.loop.loop import Loop, fly
-from beaver_ftc.studies.matrix.fault_matrix import declared
+from beaver_ftc.studies.matrix.fault_matrix import declared_errors
 from flying import SINES, scenario
 
 
 def test_in_moving_air_no_view_of_pitch_tries_what_answers_the_gusts():
     """A law that goes by the vanes moves the elevator before the gyros feel a gust."""
-    loop = Loop(scenario(duration_s=1, **declared("light")))
+    loop = Loop(scenario(duration_s=1, **declared_errors("light")))
     views = loop.frames["fdi"]["statistical"]["views"][0]
     assert [int(view["block"]["n_h"]) for view in views[:5]] == [1, 3, 3, 2, 2]
     loop.release()
@@ -41,7 +41,7 @@ def test_a_rudder_that_floats_in_a_gust_stays_a_candidate():
 )
 def test_in_declared_turbulence_a_fault_is_left_to_those_that_can_have_done_it(fault, left):
     given = {"duration_s": 16, "seed": 12, "reference": SINES, "faults": [fault | {"at_s": 6}]}
-    flight = fly(scenario(**declared("light") | given))
+    flight = fly(scenario(**declared_errors("light") | given))
     assert flight.detection_time_s > 6.0
     named = {flight.isolated} if flight.isolated else {word.split(":")[0] for word in flight.candidates}
     assert named == left

@@ -6,7 +6,7 @@ import pytest
 from beaver_ftc.diagnosis.detection.rows import INERTIAL, RAW
 from beaver_ftc.diagnosis.state import SIDE_FORCE
 from beaver_ftc.loop.loop import Loop, fly
-from beaver_ftc.studies.matrix.fault_matrix import declared
+from beaver_ftc.studies.matrix.fault_matrix import declared_errors
 from flying import SINES, scenario
 
 FAULTS = {
@@ -22,7 +22,7 @@ FAULTS = {
 def flown(fault=None, turbulence="none", **changes):
     faults = [fault | {"at_s": 6.0}] if fault else []
     given = {"duration_s": 12, "reference": SINES, "faults": faults}
-    return scenario(**declared(turbulence) | given | changes)
+    return scenario(**declared_errors(turbulence) | given | changes)
 
 
 def test_jsbsim_s_forces_are_those_of_the_aircraft_s_file():

@@ -16,12 +16,12 @@ from beaver_ftc.studies.detectability.certain import (
     MAGNITUDES,
     SETTLED_S,
     Excitation,
-    best_in_window,
     detection_magnitude,
     excitation,
     exclusion_magnitude,
     judge,
     least_distinguished_rad,
+    least_in_window,
     mismatch,
 )
 from beaver_ftc.studies.detectability.in_trim import alike
@@ -87,7 +87,7 @@ def flight():
 def test_a_fault_a_little_larger_is_found_in_time_whatever_the_uncertainty(flight, fault):
     """The map follows from the healthy flight; one with the fault must agree where it is sharpest."""
     seen = excitation(flight)
-    least = best_in_window(detection_magnitude(seen.moment[fault], seen.bound), 50)
+    least = least_in_window(detection_magnitude(seen.moment[fault], seen.bound), 50)
     start = int(np.argmin(least))
     struck_s, magnitude = SETTLED_S + start * seen.dt, 1.1 * least[start]
     flown = fly(flight.with_({"faults": [loss(fault, magnitude, struck_s)]}))

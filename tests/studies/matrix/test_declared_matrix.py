@@ -8,7 +8,7 @@ from beaver_ftc.aircraft import load
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.metrics import measure
 from beaver_ftc.studies.engine.study import run_study
-from beaver_ftc.studies.matrix.fault_matrix import declared, matrix_study, verdict
+from beaver_ftc.studies.matrix.fault_matrix import declared_errors, matrix_study, verdict
 from flying import scenario
 from samples import samples
 
@@ -40,7 +40,7 @@ def random_flight(rng, faulty):
     at_s = 4 + rng.integers(0, 600) / 100
     wrong = {name: 1 + 0.05 * rng.uniform(-1, 1) for name in NAMES}
     return scenario(
-        **declared()
+        **declared_errors()
         | {
             "duration_s": at_s + 14,
             "rate_hz": int(rng.choice([50, 100])),

@@ -29,7 +29,7 @@ from beaver_ftc.results.log import Columns
 from beaver_ftc.results.model import Document
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.studies.detectability.isolability import best_in_window, largest_and_median, loss_limits
+from beaver_ftc.studies.detectability.isolability import largest_and_median, least_in_window, loss_limits
 
 DETECT_WITHIN_S, ISOLATE_WITHIN_S = 0.5, 1.0
 SETTLED_S = 2.0  # left out: a reference begins with a step
@@ -170,9 +170,9 @@ def judge(flight: Excitation, fault: str) -> Document:
     """
     z = flight.moment[fault]
     detect, isolate = flight.windows
-    detected = best_in_window(detection_magnitude(z, flight.bound), detect)
+    detected = least_in_window(detection_magnitude(z, flight.bound), detect)
     excluded = {
-        other: best_in_window(magnitude, isolate) for other, magnitude in flight.excluding[fault].items()
+        other: least_in_window(magnitude, isolate) for other, magnitude in flight.excluding[fault].items()
     }
     isolated = np.maximum(detected[: len(z) - isolate + 1], np.max(list(excluded.values()), axis=0))
     rival = max(excluded, key=lambda other: (excluded[other].max(), np.median(excluded[other])))

@@ -36,7 +36,7 @@ def loss_limits(excluded: np.ndarray, frames: int, dt: float) -> Document:
     the first frame in which a total loss excludes the other surface; n if there is none. A loss begins at
     least `frames` before the end.
     """
-    smallest = best_in_window(excluded, frames)
+    smallest = least_in_window(excluded, frames)
     n = len(excluded)
     own = np.where(excluded <= 1.0, np.arange(n), n)
     next_exclusion = np.minimum.accumulate(own[::-1])[::-1]
@@ -45,7 +45,7 @@ def loss_limits(excluded: np.ndarray, frames: int, dt: float) -> Document:
     return dict(zip(LOSS_COLUMNS, limits, strict=True))
 
 
-def best_in_window(values: np.ndarray, frames: int) -> np.ndarray:
+def least_in_window(values: np.ndarray, frames: int) -> np.ndarray:
     """The smallest of each window of so many values (n,), (n - frames + 1,)."""
     return np.lib.stride_tricks.sliding_window_view(values, frames).min(axis=1)
 

@@ -60,21 +60,21 @@ def _scheme_lines(document: Document, sensors: str, turbulence: str) -> Iterator
     condition = {"sensors": sensors, "turbulence": turbulence}
     for surface in document["grid"]["surfaces"]:
         place = {"loss of": surface, "flown": title_of(sensors, turbulence)}
-        for level in _those(document["levels"], **condition):
+        for level in _matching(document["levels"], **condition):
             total = next(
-                _those(document["totals"], **condition, scheme=level["scheme"], surface=surface), None
+                _matching(document["totals"], **condition, scheme=level["scheme"], surface=surface), None
             )
             row = place | {"scheme": level["scheme"], "false alarms/h": _rate(level["calibration"])}
-            yield row | {"before faults/h": _rate(level["before_faults"])} | _soon(total)
+            yield row | {"before faults/h": _rate(level["before_faults"])} | _share_cells(total)
             if level["scheme"] in BUILT_IN:
                 row |= {"scheme": f"{level['scheme']}{OWN}", "false alarms/h": _rate(level["own_level"])}
-                yield row | _soon(total and total["own_level"])
-        for informed in _those(document["limits"], **condition, surface=surface):
+                yield row | _share_cells(total and total["own_level"])
+        for informed in _matching(document["limits"], **condition, surface=surface):
             shares = "/".join(map(bare_percent, informed["within"].values()))
             yield place | {"scheme": INFORMED, SOON: shares}
 
 
-def _soon(total: Document | None) -> Line:
+def _share_cells(total: Document | None) -> Line:
     """The shares found within each of WITHIN_S in per cent, the median delay and the number of flights."""
     if not total or not total["flights"]:
         return {SOON: "-"}
@@ -92,12 +92,12 @@ def who_is_better(
     for surface in document["grid"]["surfaces"]:
         place = condition | {"surface": surface}
         rows = dict[str, Document]()
-        for total in _those(document["totals"], **place):
+        for total in _matching(document["totals"], **place):
             scheme = total["scheme"]
             if total["flights"] and (scheme == BOTH or scheme not in BUILT_IN):
                 estimate = total["within"][soon]
                 pair = {"against": scheme, "ours": BOTH, "within_s": within_s}
-                line = next(_those(document["comparison"], **place, **pair), _NO_DUEL)
+                line = next(_matching(document["comparison"], **place, **pair), _NO_DUEL)
                 duel = {"better": line["seeds_theirs"], "worse": line["seeds_ours"], "p": line["p"]}
                 rates = {
                     "rate": estimate["value"],
@@ -124,8 +124,8 @@ def comparison(document: Document) -> list[str]:
     return sentences
 
 
-def _those(lines: Sequence[Document], **where: Any) -> Iterator[Document]:
-    """The lines with these values."""
+def _matching(lines: Sequence[Document], **where: Any) -> Iterator[Document]:
+    """The lines that have all these values."""
     return (line for line in lines if where.items() <= line.items())
 
 

@@ -56,14 +56,14 @@ class Threshold:
 
 
 class Sizes:
-    """What is known of X: _missed < X_i <= _found for each flight i, (most,) per cent. flights: the first so
-    many count."""
+    """Bounds on the size X_i that each flight i finds: _missed < X_i <= _found, (n,) per cent. flights: the
+    first so many of the n flights are counted."""
 
-    def __init__(self, is_found: IsFound, most: int) -> None:
+    def __init__(self, is_found: IsFound, n: int) -> None:
         self._is_found = is_found
-        self.flights = most
-        self._missed = np.zeros(most, int)
-        self._found = np.full(most, NEVER)
+        self.flights = n
+        self._missed = np.zeros(n, int)
+        self._found = np.full(n, NEVER)
 
     def count(self, size: int) -> int:
         """How many flights find this size. Flights for which this is not known are flown."""

@@ -36,7 +36,7 @@ def binomial(events: int, trials: int, confidence: float = CONFIDENCE) -> Estima
     return _rate(events, trials, confidence, "exact")
 
 
-@functools.cache  # a study asks for the same few counts in every table, 3 ms each
+@functools.cache  # a study needs the same few counts in every table, 3 ms each
 def _rate(count: int, trials: int, confidence: float, method: str) -> Estimate:
     """count / trials with its two-sided interval by this method of scipy; NaN with (0, 1) without a trial."""
     from scipy.stats import binomtest

@@ -60,7 +60,7 @@ class FaultCase(NamedTuple):
     fault: str
     surface: str
     airspeed_mps: float
-    declared: bool = False  # whether it has the errors of `declared`
+    declared: bool = False  # whether it has the errors of `declared_errors`
     aircraft: str = DEFAULT
     turbulence: str = "none"  # flown and declared, with `declared`
 
@@ -88,7 +88,7 @@ def cases(
     ]
 
 
-def declared(turbulence: str = "none", aircraft: str = DEFAULT) -> Document:
+def declared_errors(turbulence: str = "none", aircraft: str = DEFAULT) -> Document:
     """Keys of a scenario with errors of sensors, servos, air and coefficients, all of them declared.
     Coefficients are in turn at the lower and the upper end of their tolerance, if the truth has a factor for
     them. Without any factor, no model error is flown.
@@ -134,7 +134,7 @@ def scenario_of(case: FaultCase, law: str, trimmed_deg: float) -> Scenario:
             "fdi": {"fault_class": "all"},
             "control": {"law": law},
         }
-        | (declared(case.turbulence, case.aircraft) if case.declared else {})
+        | (declared_errors(case.turbulence, case.aircraft) if case.declared else {})
     )
 
 

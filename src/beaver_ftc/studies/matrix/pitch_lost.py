@@ -144,10 +144,10 @@ FILES: Makers = {f"{NAME}.json": as_json, f"{NAME}.txt": lambda document: as_tex
 def _cell(row: Document) -> str:
     """Both outcomes of a case."""
     star = "*" if row["with"]["outside_share"] > 0.0 else ""
-    return f"{_half(row['without'])} > {_half(row['with'])}{star}"
+    return f"{_outcome_text(row['without'])} > {_outcome_text(row['with'])}{star}"
 
 
-def _half(outcome: Document) -> str:
+def _outcome_text(outcome: Document) -> str:
     """One outcome: RMS pitch rate and swing, or the time of the loss."""
     if outcome["departure"]:
         return f"lost {outcome['departure']['time_s']:.1f} s"

@@ -5,7 +5,8 @@ A detector flies with our default law, in faulted flights F and healthy flights 
     J = mean over F of [ d / (d + 1 s) + w ] / 2  +  mean over F and H of a
 
 d: delay of the alarm, s; infinite for a missed fault. w: 1 if the name at the end is wrong or missing, else
-0. a: 1 for a false alarm, else 0. The best J is 0, the worst 2.
+0. a: 1 for a false alarm, else 0. After a false alarm, d is infinite and w is 1. The best J is 0, the worst
+2.
 
 A law flies with our default scheme, over faulted flights:
 

@@ -98,7 +98,7 @@ class Result:
 
     - fault_free_s: time in which an alarm would be false, s. faulted: whether the fault begins in the flight.
     - delay_s, isolation_delay_s: from the fault to the alarm, and to its right name, s. correct: whether the
-      name at the end is right.
+      name at the end is right, without a false alarm before the fault.
     - rms_deg_s: RMS tracking error of all axes after the fault, or of the whole flight without a fault;
       infinite after a departure. before_deg_s, after_deg_s: the same before and after the fault.
     - travel_deg_s: path of all surfaces over the time flown.

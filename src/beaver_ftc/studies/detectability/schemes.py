@@ -257,7 +257,8 @@ class Watched:
 
 
 def fly_block(case: tuple[Block, bool], grid: Grid, schemes: Sequence[str]) -> Watched:
-    """Every fault of the grid in a block, or the one flight of a block without a fault."""
+    """Every fault of the grid in a block, or the one flight of a block without a fault. case: the block, and
+    whether it has faults."""
     block, faulted = case
     if not faulted:
         healthy = scenario_of(block, grid.healthy_flight_s, where=grid.where)

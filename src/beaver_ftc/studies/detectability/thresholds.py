@@ -11,9 +11,9 @@ Only three order statistics of X are needed, not each X_i. Each is found by bise
 quickselect. A flight that has found size a is not flown at larger sizes, and one that has missed size b not
 at smaller ones. A flight far from the quantile is therefore flown once or twice.
 
-Flights are added in stages until the interval is narrow. The error probability is divided equally among the
-stages. By the union bound, the interval then covers the quantile with the declared confidence, although the
-number of stages depends on the flights.
+Flights are added in stages until the interval is narrow, or the last stage is flown. The error probability is
+divided equally among the stages. By the union bound, the interval then covers the quantile with the declared
+confidence, although the number of stages depends on the flights.
 
 Sizes are in whole per cent: a size is the smallest of these at which the fault is found.
 """

@@ -232,11 +232,11 @@ def _share_of_limit(result: Expectation) -> float | None:
 
 def value_text(value: Any) -> str:
     """An expected or actual value of any key of `expect:` as text."""
-    if value is None or value == ():
+    if value in (None, (), []):
         return "none"
     if isinstance(value, bool):
         return "yes" if value else "no"
-    if isinstance(value, tuple):
+    if isinstance(value, tuple | list):
         return ", ".join(value_text(entry) for entry in value)
     return value if isinstance(value, str) else three_digits(value)
 

@@ -151,6 +151,11 @@ def test_what_a_line_promises_holds_in_flight(flight):
         assert flown.detection_time_s - struck_s <= 0.5 + 1e-9
 
 
+def test_a_place_keeps_the_declared_errors_of_the_servos():
+    declared = scenario().with_({"fdi.bounds.actuators.bandwidth": 0.2})
+    assert at(declared, 50.0, 1800.0, 1.0).fdi.bounds.actuators == declared.fdi.bounds.actuators
+
+
 @needs.service("derive")
 def test_another_aircraft_has_its_own_errors():
     """One of plain JSBSim has no property for the errors of the Beaver's truth."""

@@ -82,14 +82,14 @@ def with_aircraft(scenario: Scenario, reference: str) -> Scenario:
     the working directory."""
     find_aircraft(reference, Path())
     given = {"aircraft": reference, "initial": {}, "uncertainty": {}, "actuators": "ideal"}
-    return Scenario.model_validate(_without_faults(scenario) | given)
+    document = _without_faults(scenario)
+    del document["fdi"]["bounds"]["actuators"]
+    return Scenario.model_validate(document | given)
 
 
 def _without_faults(scenario: Scenario) -> Document:
-    """The keys of a scenario without faults, expectations and bounds on servos."""
-    document = scenario.model_dump(mode="json", exclude_none=True)
-    del document["fdi"]["bounds"]["actuators"]
-    return {**document, "faults": [], "expect": {}}
+    """The keys of a scenario without faults and expectations."""
+    return {**scenario.model_dump(mode="json", exclude_none=True), "faults": [], "expect": {}}
 
 
 def rows_at_place(scenario: Scenario, point: tuple[float, float, float]) -> dict[str, list[Document]]:

@@ -263,6 +263,8 @@ REFUSED = [
      "a frame before the alarm may be healthy"),
     ("loss", "rudder", WHERE_SHOWN, "only a fault type is at fault where health fails"),
     ("any type", "aileron float", WHERE_SHOWN | {"terms": frame(EARLY)}, "health explains a frame"),
+    ("any type", "aileron float", WHERE_SHOWN | {"terms": frame(52, since=49, pole_per_s=9.0)},
+     "health explains a frame"),
     ("any type", "aileron loss_of_effectiveness that varies", WHERE_SHOWN,
      "theta of this type is not one number"),
     ("loss", "rudder", {"terms": frame(52)}, "a frame after the event cannot have caused it"),

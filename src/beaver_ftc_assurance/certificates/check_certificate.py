@@ -356,8 +356,9 @@ def check_declared(document, declared):
     """Refuse bounds that are not those of the scenario.
 
     The bias B of a gyro may be left out: the bound on its noise is then larger, which proves less. c, b and g
-    only explain the bound in the log, and are tested only if omega_E is stated. b is at least the constant
-    bound of the scenario. c must be zero on an axis for which the scenario declares no share.
+    only explain the bound in the log, and are tested if omega_E is stated, as terms and bounds need it. b is
+    at least the constant bound of the scenario. c must be zero on an axis for which the scenario declares no
+    share.
     """
     check_form(document.get("declared"), *FORMS["declared"], "declared")
     for axis, (offset, bias, slope) in declared.gyro_errors.items():
@@ -1024,6 +1025,8 @@ def check_statement(statement, document, log, declared):
     """Raise Refused unless the statement follows from log and scenario."""
     kind = check_statement_form(statement)
     check_event(statement, log)
+    is_bounded = "omega_E" in document or not {"terms", "bounds"} & {*statement}
+    require(is_bounded, "omega_E is missing: without it b is not compared with the scenario's bound")
     frames = Frames(document, log, declared, statement.get("block"))
     if kind == "as":
         check_exclusion_by_alarm(statement, document, frames)

@@ -340,6 +340,12 @@ def test_what_is_another_is_refused_in_words(name, what, changes, says):
     assert whys[:1] == [says] * bool(says)
 
 
+def test_a_sum_needs_the_rate_of_the_earth_with_its_bounds():
+    other = flown("loss")[0] | {}
+    del other["omega_E"]
+    assert "omega_E is missing" in refusals("loss", with_digest(other))[0]
+
+
 def parts(value, *above):
     """Each number, text and list of a statement, by its keys."""
     keys = value if isinstance(value, dict) else range(len(value)) if isinstance(value, list) else ()

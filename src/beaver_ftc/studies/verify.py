@@ -94,13 +94,15 @@ def judge(flight: Landing) -> Row:
     guaranteed_s = flight.guaranteed_delay_s
     alarm_s = flight.detection_time_s
     delay_s = truth.onset.delay_s(alarm_s)
+    is_false = alarm_s is not None and truth.onset.is_false(alarm_s)
     not_excluded = (*flight.candidates, flight.isolated)
     rightly_named = truth.faults_named_rightly_by(flight.isolated, flight.isolation_time_s)
     return {
         "delay_s": delay_s,
-        "false_alarm": alarm_s is not None and truth.onset.is_false(alarm_s),
+        "false_alarm": is_false,
         "guaranteed_s": guaranteed_s,
         "late": guaranteed_s is not None
+        and not is_false
         and (delay_s is None or is_late(delay_s, guaranteed_s, 1.0 / flight.scenario.rate_hz)),
         "isolation_delay_s": truth.onset.delay_s(flight.isolation_time_s),
         "excluded": alarm_s is not None
@@ -185,7 +187,7 @@ def _scheme(rows: Sequence[Row]) -> Document:
     n = len(rows)
     counts = {promise: sum(row[kind.broken] for row in rows) for promise, kind in PROMISES.items()}
     certain = [row for row in rows if row["guaranteed_s"] is not None]
-    ratios = [row["delay_s"] / row["guaranteed_s"] for row in certain if row["delay_s"]]
+    ratios = [row["delay_s"] / row["guaranteed_s"] for row in certain if row["delay_s"] is not None]
     errors = [row["estimate_error"] for row in rows if row["estimate_error"] is not None]
     return {
         **counts,

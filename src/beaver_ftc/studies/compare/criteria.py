@@ -217,9 +217,11 @@ class LawCost(Cost):
         return cost
 
     def _part(self, n: int, result: Result) -> float:
-        """log(e / e_oracle), with at most LOST in the logarithm."""
-        rms_deg_s = result.rms_deg_s
-        return log(min(rms_deg_s / self._oracle[n], LOST) if isfinite(rms_deg_s) else LOST)
+        """log(e / e_oracle), with at most LOST in the logarithm; 0 if the oracle loses the aircraft."""
+        rms_deg_s, oracle = result.rms_deg_s, self._oracle[n]
+        if not isfinite(oracle):
+            return 0.0
+        return log(min(rms_deg_s / oracle, LOST) if isfinite(rms_deg_s) else LOST)
 
 
 @cache

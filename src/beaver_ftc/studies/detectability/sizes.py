@@ -78,7 +78,7 @@ class _Flown:
         missing = [flight for flight in flights if flight not in self.rows]
         if missing:
             self.rows.update(zip(missing, self.fly(missing), strict=True))
-            self.tell(f"{variant}: {len(self.rows)} flights")
+            self.tell(f"{variant}: {len(missing)} more flights")
         return [self.rows[flight] for flight in flights]
 
     def flags_of(self, variant: str, key: str, runs: Sequence[int], size: int) -> list[bool]:

@@ -47,7 +47,7 @@ def findings(document: Document) -> list[str]:
     lines = [f"dominant     {dominant}"]
     if document["false_alarm"]:
         detection = document["detection"]
-        lines.append(f"FALSE ALARM  at {detection['time_s']:.2f} s on {detection['axis']}")
+        lines.append(f"FALSE ALARM  at {detection['time_s']:.2f} s on {detection['axis'] or 'no axis'}")
     return [*lines, *_advice(document)]
 
 

@@ -26,6 +26,7 @@ from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recording import Floats
 from beaver_ftc_logs.regression import innovations
 from beaver_ftc_logs.samples import Samples
+from beaver_ftc_logs.stepped import LOSS_FAULT_TYPE
 
 LOOP_SURFACES = ("aileron", "elevator", "rudder")
 _N_LOOP = 4  # number of surfaces of the loop: these and the flap
@@ -122,7 +123,7 @@ def rows_of_verdicts(verdicts: list[Verdict], samples: Samples, model: Model) ->
     ).T
     # If there is a statistic, it decides: `detected` of a detector of the loop stays true after its first
     # alarm.
-    faulty = np.where(np.isfinite(statistic), statistic > 1.0, detected).astype(np.int64)
+    faulty = np.where(np.isnan(statistic), detected, statistic > 1.0).astype(np.int64)
     a, low = np.ones((2, n, len(model.vehicle.surfaces)))
     names = np.full(n, "", dtype=object)
     for k in np.flatnonzero(faulty):
@@ -139,10 +140,12 @@ def rows_of_verdicts(verdicts: list[Verdict], samples: Samples, model: Model) ->
 
 
 def _remaining_effectiveness(verdict: Verdict, g: int) -> float:
-    """Effectiveness of group g by a verdict, 0 to 1: that of the verdict, otherwise 1 + its estimate of the
-    loss, otherwise 1.
+    """Effectiveness of group g by a verdict, 0 to 1: that of the verdict, otherwise 1 + theta if its estimate
+    is theta, that of a loss, otherwise 1.
     """
-    effectiveness = verdict.effectiveness
-    return float(
-        np.clip(1.0 + (verdict.estimate or 0.0) if effectiveness is None else effectiveness[g], 0.0, 1.0)
-    )
+    value = 1.0
+    if verdict.effectiveness is not None:
+        value = verdict.effectiveness[g]
+    elif verdict.type in (None, LOSS_FAULT_TYPE):
+        value += verdict.estimate or 0.0
+    return float(np.clip(value, 0.0, 1.0))

@@ -69,8 +69,8 @@ class Source:
 
     @property
     def sha256(self) -> str:
-        """SHA-256 of the resolved scenario or sweep without description and expectations, and of the files of
-        its aircraft."""
+        """SHA-256 of the files of its aircraft and of the content: a resolved scenario without description
+        and expectations, or a sweep without these, with its base as it is written."""
         aircraft = digest_of_aircraft(self.aircraft.folder)
         left_out = {"description", "expect"}
         if isinstance(self.content, Sweep):

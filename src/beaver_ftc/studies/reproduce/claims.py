@@ -4,11 +4,12 @@
     ablation         the same flights without the mechanism to which the statement refers
     borne out        the statement holds, and does not hold in its ablation
     not borne out    the number does not keep its limit
-    stronger         it is also borne out in each setting that the paper did not fly
-    cannot be judged it holds also in its ablation, or there is nothing to measure
+    stronger         it is also borne out in each setting that the paper did not fly; there a statement that
+                     is true by the construction of the code must only hold
+    cannot be judged it holds also in its ablation, or there is nothing to measure (reproduction.py)
 
-That a number keeps its limit alone would not show that the mechanism is the reason. Statements that are true
-by the construction of the code are counted separately.
+A number that keeps its limit does not yet show that the mechanism is the reason. Statements that are true by
+the construction of the code are counted separately.
 """
 
 from collections.abc import Callable, Mapping, Sequence

@@ -17,7 +17,8 @@ from beaver_ftc.control.thrust import ENGINE, set_up_engine
 from beaver_ftc.scenario.declared import Declared
 
 # Gains of the loops: K, 1/s, and K_i, 1/s2, whose name ends with `_i`; times, s; and bounds of the demands.
-# The attitude loops are a fifth as fast as the inner loops, and the path loop is a quarter as fast as these.
+# The loop of the pitch attitude is a fifth as fast as the inner loop, and the path loop a quarter as fast as
+# this one; the loop of the bank is slower.
 # Gusts set the gains, not comfort.
 GAINS = {
     "altitude": 0.8, "altitude_i": 0.04, "attitude": 3.0, "speed": 0.3, "speed_i": 0.015,
@@ -54,7 +55,7 @@ AUTOPILOT = record(
     pitch_holds_airspeed=int,  # whether pitch, and not power, holds the airspeed
     trim_power=float, low_power=float, high_power=float,  # setting in trim, and its range
     climb_in_trim=float,  # gamma_trim, rad, with the engine as trimmed
-    dihedral=float,  # 1/m: roll rate per rad of sideslip and m/s of airspeed
+    dihedral=float,  # 1/m: minus roll rate per rad of sideslip and m/s of airspeed
     full_power=float, allowed_power=float,  # the highest setting now; the highest that the rudder allows
     dpt_cubed_held_by_sideslip=float,  # dpt^3 whose yawing moment the largest accepted sideslip holds
     slowest_mps=float, steepest_alpha=float,  # least airspeed, m/s, and largest angle of attack, rad, to fly

@@ -4,7 +4,7 @@ The flap goes down and back, and the allocation gives the rest of the pitch dema
 healthy aircraft the two moments cancel. If a surface does not follow, they do not, and the diagnosis detects
 it.
 
-    deflection = amplitude (1 - cos phase) / 2,    phase = step frames        rad, of the flap
+    deflection = amplitude (1 - cos phase) / 2,    phase = step probed        rad, of the flap
 """
 
 from math import pi, radians
@@ -18,7 +18,7 @@ from beaver_ftc.scenario.diagnosis import Probing
 # frames after which the movement ends when it is next at rest, 0 for no probe.
 CONFIG = record(amplitude=float, step=float, frames=int)
 # deflection rad of the flap; probed: frames of the present movement, 0 without one; from_s, to_s: when it
-# began and ended, s, -1 for never.
+# began and ended, s, -1 for never (0 without a probe).
 MEMORY = record(deflection=float, probed=int, from_s=float, to_s=float)
 PROBE = record(config=CONFIG, memory=MEMORY)
 

@@ -16,7 +16,7 @@ from beaver_ftc.diagnosis.gusts import MIN_UNMEASURED_SHARES
 from beaver_ftc.diagnosis.monitors.redundancy import EARTH_M_S2
 from beaver_ftc.scenario.declared import MASS_TOLERANCE, Declared, SensorErrors
 
-INTEGRATION_NOISE_GAIN = 1.6  # noise gain of the two-step method: sqrt(1.5^2 + 0.5^2)
+INTEGRATION_NOISE_GAIN = 1.6  # noise gain of the two-step method: sqrt(1.5^2 + 0.5^2), rounded up
 MAX_GUST_STDS = 4.0  # limit of the estimated gust velocity, standard deviations
 MAX_PATH_SLOPE_RAD = 0.3  # largest slope of the path: this share of an error of gravity acts along the path
 MAX_DRAG_OVER_WEIGHT = 0.3  # largest drag over weight: errors of coefficients are a share of the drag
@@ -51,9 +51,10 @@ def add_gust_noise(
 ) -> None:
     """Add the noise of the gust estimate to the model noise of the detector.
 
-    It is the noise of the flow angles from the vanes, rad, and, if accelerometers predict the velocity, of
-    these, integrated over a frame of dt s. The estimate without vanes, `gust_noise` of the forces, has the
-    noise of the accelerometers over the effect of the flow angle. y, u: in trim.
+    It is the noise of the flow angles from the vanes, rad, and, if accelerometers predict the velocity,
+    theirs, integrated over a frame of dt s; the sum of both, as if they were fully correlated. The estimate
+    without vanes, `gust_noise` of the forces, has the noise of the accelerometers over the effect of the flow
+    angle. y, u: in trim.
     """
     std = flow_noise(errors, y[AIRSPEED])
     forces = stat["forces"]

@@ -27,8 +27,7 @@ AUTHORITIES = {
 # Schemes: ours; the published one; none; that of a plug-in, whose verdict replaces ours.
 ADAPTIVE_SCHEME, PUBLISHED_SCHEME, NO_SCHEME, PLUGIN_SCHEME = range(4)
 _SCHEMES = {"adaptive-estimators": ADAPTIVE_SCHEME, "zhang2005": PUBLISHED_SCHEME, "none": NO_SCHEME}
-# Kinds of hypothesis (isolation.py): a surface has lost effectiveness; it is anywhere in its travel. LOSS of
-# types/table is a fault type, and not this number.
+# Kinds of hypothesis (isolation.py): a surface has lost effectiveness; it is anywhere in its travel.
 LOSS, POSITION_HYPOTHESIS = 0, 1
 PITCH_GROUP, LATERAL_GROUP = 0, 1  # groups of surfaces
 ROLL, PITCH, YAW, SIDE_FORCE, NORMAL_FORCE = range(5)  # axes, and components of the force (forces.py)

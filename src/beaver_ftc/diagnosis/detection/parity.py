@@ -173,9 +173,9 @@ def turn_view(view, rows, gust):
 def fill_view_drift(view, q, gust, source_gust, forces, V):
     """Fill the drift of a view, (rad/s2)2/s, at a speed V m/s.
 
-    It is that of a bounded uncertainty, for source INERTIAL that of the flow angle from inertial motion, and
-    in moving air that of the rotation of the air, by L_rate = m' L and L_force = sum over the forces of m
-    L_f.
+        Q_d = q max(eta, MIN_ETA_RAD_S2)^2      bounded uncertainty
+              + sum_f (m_f q_ratio)^2 Q_e,f     source INERTIAL: flow angle from inertial motion
+              + `view_drift`                    moving air, by L_rate = m' L, L_force = q_ratio sum_f m_f L_f
 
     q: see NOISE_RECORD. gust: the gust estimate that gives L and the variance by turns; source_gust: that of
     this view's source, which gives the drift.

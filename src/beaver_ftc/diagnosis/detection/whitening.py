@@ -1,6 +1,6 @@
 """The whitening filter of a block: a Kalman filter of the innovation, with a drift.
 
-    x[k+1] = x[k] + dt (F[k] + d[k] + phi[k])      d[k+1] = a d[k] + drift      measured: x + gyro noise
+    x[k] = x[k-1] + dt (F[k] + d[k] + phi[k])      d[k+1] = a d[k] + drift      measured: x + gyro noise
 
 x are the rates, rad/s; F, rad/s2, is the acceleration of the design model; d, rad/s2, is the drift: a slow
 error of F by rotation of the air, by bounded uncertainty, by unknown constants. phi, rad/s2, is a fault. With

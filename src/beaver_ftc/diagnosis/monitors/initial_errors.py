@@ -62,7 +62,8 @@ y_past: those of the sample before. Letters of the kernels that fill H and C:
     A        bound on |a| in the step, times dt2, m/s         A_V = A / V, rad
     G        gravity times dt2, m/s
     dt2      dt and what is of second order in it, s
-    rate     `in_plane` of (p, q, r), rad/s: the part of the rate along the flow, + i that across it
+    rate     `in_plane` of (p, q, r), rad/s: the part of the rate along the flow, + i that against the axis
+             across it
     sec      1 / cos(beta) by its reading
     x, E     error of the hypothesis, and the bound on it
 """

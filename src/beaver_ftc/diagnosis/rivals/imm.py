@@ -104,7 +104,7 @@ class InteractingMultipleModels(KalmanRival):
         """The verdict by the probabilities, with the level `isolate`:
 
         unknown mode above `isolate`                       unanticipated
-        modes of one surface together above `isolate`      this surface, with their mean theta
+        modes of one surface together at least `isolate`   this surface, with their mean theta
         otherwise                                          candidates: surfaces above 1 - `isolate`
         """
         level, levels = self.options["isolate"], self.mu[1:-1].reshape(3, N_LEVELS)

@@ -15,7 +15,9 @@ measured.
 Turbulence is the rotation of the air as three more states, a first-order process for each axis, as declared
 (design/context.py):
 
-    g[k+1] = a g[k] + sqrt(1 - a^2) sigma w[k],   a = exp(-dt / tau),      xdot = f + G u + B g
+    g[k+1] = a g[k] + sqrt(1 - a^2) sigma w[k],   a = exp(-dt / tau);      F adds dt B g to the rates
+
+B (3, 3), 1/s: `gust_effect`.
 """
 
 import numpy as np
@@ -28,8 +30,8 @@ class KalmanRival(RivalDetector):
     """Base of the rivals by Kalman filters: each has `predict` and `update_statistic`.
 
     F (n, n): transition without the dynamics of the aircraft. q (n,): diagonal of Q, without that of the
-    rates. R (3, 3): covariance of the measurement, (rad/s)2. z, P: state and covariance of one filter.
-    before: the measurements of the frame before; None in the first frame.
+    rates. R (3, 3): covariance of the measurement, (rad/s)2. z, P: state and covariance of the filter, or of
+    each one. before: the measurements of the frame before; None in the first frame.
     """
 
     before: Measured | None

@@ -16,8 +16,9 @@ UNANTICIPATED = Verdict(True, None, "unanticipated", "unanticipated")
 class RivalDetector:
     """Base of the rival detectors; each has `start`, `advance` and `isolate`.
 
-    After `reset`, options has the parameters, context and dt (s) are those of the flight, leading (3,) has
-    the surfaces that lead roll, pitch and yaw, and alarm_s, alarm_axis describe the alarm (inf: none yet).
+    After `reset`, options has the parameters, context and dt (s) are those of the flight (its turbulence: see
+    `reset`), leading (3,) has the surfaces that lead roll, pitch and yaw, and alarm_s, alarm_axis describe
+    the alarm (inf: none yet).
     """
 
     name: ClassVar[str] = ""

@@ -198,7 +198,8 @@ def has_second(types):
 @kernel
 def begin_second_if_shown(types, layout):
     """Begin the diagnosis of a second pitch fault once no constant type on the first surface explains the
-    flight: the first gets its stored sets back, and its partner, if it has one, starts with no knowledge."""
+    flight, if that surface has a partner: the first gets its stored sets back, and the partner starts with no
+    knowledge."""
     s1 = types.pair.first_pitch
     if s1 == NO_SURFACE or layout.partner[s1] < 0 or has_second(types):
         return

@@ -187,7 +187,8 @@ def _scheme(rows: Sequence[Row]) -> Document:
     n = len(rows)
     counts = {promise: sum(row[kind.broken] for row in rows) for promise, kind in PROMISES.items()}
     certain = [row for row in rows if row["guaranteed_s"] is not None]
-    ratios = [row["delay_s"] / row["guaranteed_s"] for row in certain if row["delay_s"] is not None]
+    timed = [row for row in certain if row["guaranteed_s"] and row["delay_s"] is not None]
+    ratios = [row["delay_s"] / row["guaranteed_s"] for row in timed]
     errors = [row["estimate_error"] for row in rows if row["estimate_error"] is not None]
     return {
         **counts,

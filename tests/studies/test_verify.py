@@ -76,8 +76,9 @@ def test_the_promises_hold_in_the_small(flown):
 
 
 def test_only_what_is_flown_is_said_to_hold():
-    at_once = _faulty_row(delay_s=0.0, guaranteed_s=0.0)
-    assert "G1 to G3 hold" in summary_text(summarise({"healthy": [], "faulty": [at_once]}))
+    assert "G1 to G3 hold" in summary_text(
+        summarise({"healthy": [], "faulty": [_faulty_row(delay_s=0.0, guaranteed_s=0.0)]})
+    )
     assert "Nothing is tested" in summary_text(summarise({"healthy": [], "faulty": []}))
 
 

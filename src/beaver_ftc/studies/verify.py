@@ -168,7 +168,6 @@ def _healthy_document(rows: Sequence[Row]) -> Document:
     SCHEMES, in their order."""
     hours = sum(row["watched_s"] for row in rows) / 3600.0
     alarms = sum(row["alarm"] for row in rows)
-    closest = map(max, zip(*(row["closest"] for row in rows), strict=True))
     return {
         "flights": len(rows),
         "hours": hours,
@@ -177,7 +176,9 @@ def _healthy_document(rows: Sequence[Row]) -> Document:
         "false_alarms_per_hour_upper_95": finite(poisson_bound(alarms, hours, CONFIDENCE, upper=True)),
         "departures": sum(row["departed"] for row in rows),
         "hours_outside_envelope": sum(row["outside_s"] for row in rows) / 3600.0,
-        "closest_approach": dict(zip(SCHEMES, closest, strict=bool(rows))),
+        "closest_approach": {
+            scheme: max(row["closest"][i] for row in rows) for i, scheme in enumerate(SCHEMES) if rows
+        },
     }
 
 

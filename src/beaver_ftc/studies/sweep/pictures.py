@@ -202,7 +202,7 @@ def sensitivity(flights: Flights, summary: Document) -> "Figure | None":
     keys = [entry["key"] for entry in next(iter(rankings.values()))][:12]
     explained = [{entry["key"]: entry["explained"] for entry in ranking} for ranking in rankings.values()]
     shares = np.array([[share_of[key] for share_of in explained] for key in keys])
-    title = "Sensitivity: share of an outcome that a key explains by rank correlation"
+    title = "Sensitivity: share of the ranks of an outcome that a key explains"
     outcomes = [OUTCOMES[name] for name in rankings]
     return _shaded(title, shares, lambda at: f"{shares[at]:.2f}", outcomes, list(map(in_words, keys)))
 

@@ -166,7 +166,7 @@ def conclude(sweep: Sweep, options: Options, store: Store) -> Document:
             assignment = assignment_of(sweep, options, flight["run"])
             one_flight.keep_flight(sweep, assignment, options.keep, report=True)
     if options.report:
-        _draw(sweep, flights, document, store)
+        _draw(flights, document, store)
     store.write("summary.json", as_json(document))
     if not flights.measured.any():
         raise SimulationFailed(f"{sweep.name}: no flight could be flown: {document['reasons'][0]['reason']}")
@@ -190,7 +190,7 @@ def _summary(sweep: Sweep, options: Options, flights: "Flights", results: Path) 
     }
 
 
-def _draw(sweep: Sweep, flights: "Flights", document: Document, store: Store) -> None:
+def _draw(flights: "Flights", document: Document, store: Store) -> None:
     """Write the figures and the report, which contains them."""
     from beaver_ftc.studies.sweep.pictures import write_figures
     from beaver_ftc.studies.sweep.summary_page import render

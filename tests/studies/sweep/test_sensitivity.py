@@ -24,6 +24,13 @@ def test_the_key_that_drives_comes_first_and_idle_ones_explain_nothing(keys):
     assert all(entry["explained"] < 0.03 and entry["p_value"] > 0.02 for entry in found[1:])
 
 
+def test_of_twenty_idle_keys_none_passes_by_chance():
+    generator = np.random.default_rng(3)
+    idle = {f"key {i}": generator.random(100) for i in range(20)}
+    smallest = [min(entry["p_value"] for entry in rank(idle, generator.random(100))) for _ in range(10)]
+    assert sum(p <= 0.05 for p in smallest) <= 2  # 0.5 are expected; of p-values of each key by itself, 6
+
+
 def test_an_effect_that_is_not_monotone_is_seen(keys):
     found = rank(keys, (keys["driver"] - 0.5) ** 2)
     assert found[0]["key"] == "driver"

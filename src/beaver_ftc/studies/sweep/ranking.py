@@ -3,7 +3,7 @@ matter.
 
 `explained` is the share of the variance of the ranks of the outcome between groups of flights with similar
 values of the key, corrected for chance (Kruskal and Wallis' epsilon squared). Its p-value is from random
-permutations.
+permutations of the outcome, and adjusted for the number of keys by their maximum [WestfallYoung1993].
 """
 
 import numpy as np
@@ -22,13 +22,30 @@ def rank(keys: dict[str, np.ndarray], outcome: np.ndarray) -> Ranking:
 
     keys: by name, values (n,), numbers or texts. outcome (n,), which may be infinite. An entry has `key`,
     `explained` (share of the variance of ranks), `rank_correlation` (Spearman's, null for texts) and
-    `p_value`. The list is empty for fewer than 2 BINS flights, and if all outcomes are equal.
+
+        p_value = (1 + permutations in which any key explains as much) / (1 + permutations)
+
+    The list is empty for fewer than 2 BINS flights, and if all outcomes are equal.
     """
     chosen = np.arange(0, outcome.size, max(1, -(-outcome.size // MOST_FLIGHTS)))
     ranks = ranks_of(outcome[chosen])
     if ranks.size < 2 * BINS or ranks.min() == ranks.max():
         return []
-    entries = [_entry(key, values[chosen], ranks) for key, values in keys.items()]
+    groups_of = {key: _groups(values[chosen]) for key, values in keys.items()}
+    generator = np.random.default_rng(0)
+    largest_by_chance = np.array([
+        max((_explained(groups, shuffled) for groups in groups_of.values()), default=0.0)
+        for shuffled in (generator.permutation(ranks) for _ in range(PERMUTATIONS))
+    ])  # fmt: skip
+    entries = []
+    for key, groups in groups_of.items():
+        share = _explained(groups, ranks)
+        entries.append({
+            "key": key,
+            "explained": round(max(share, 0.0), 6),
+            "rank_correlation": _spearman(keys[key][chosen], ranks),
+            "p_value": (1 + int((largest_by_chance >= share).sum())) / (1 + PERMUTATIONS),
+        })  # fmt: skip
     return sorted(entries, key=lambda entry: (-entry["explained"], entry["key"]))
 
 
@@ -37,20 +54,6 @@ def ranks_of(values: np.ndarray) -> np.ndarray:
     from scipy.stats import rankdata
 
     return rankdata(values) - 1.0
-
-
-def _entry(key: str, values: np.ndarray, ranks: np.ndarray) -> Document:
-    """The entry of a key. p = (1 + permutations that explain as much) / (1 + permutations)."""
-    groups = _groups(values)
-    share = _explained(groups, ranks)
-    generator = np.random.default_rng(0)
-    by_chance = sum(_explained(groups, generator.permutation(ranks)) >= share for _ in range(PERMUTATIONS))
-    return {
-        "key": key,
-        "explained": round(max(share, 0.0), 6),
-        "rank_correlation": _spearman(values, ranks),
-        "p_value": (1 + by_chance) / (1 + PERMUTATIONS),
-    }
 
 
 def _groups(values: np.ndarray) -> np.ndarray:

@@ -28,14 +28,14 @@ from beaver_ftc.studies.sweep.pictures import FIGURES
 from beaver_ftc.studies.sweep.summary import OUTCOMES
 
 MANY = 0.1  # share of the faulted flights from which on there is a warning
-# A key is named if, by itself, it has at most this p-value and explains at least this share of the ranks.
+# A key is named if it has at most this p-value and explains at least this share of the ranks.
 MAX_P_VALUE = 0.05
 MIN_EXPLAINED = 0.01
 SHOWN = 3  # number of keys of an outcome, and of worst flights, for the terminal
 _STEERED = "The search steered these flights towards the worst: rates say nothing about flights in general."
 _SENSITIVITY_NOTE = (
     "Share of the ranks of an outcome that a varied key explains (Kruskal and Wallis' epsilon squared), "
-    "Spearman's rank correlation, and how often chance alone explains as much."
+    "Spearman's rank correlation, and the probability that chance alone explains as much with any key."
 )
 value = partial(number, none="none")
 _seconds = partial(number, unit="s", none="never")
@@ -225,8 +225,7 @@ def _guarantee(counts: Document) -> str:
 
 
 def _drivers(ranking: list[Document]) -> str:
-    """At most SHOWN keys that explain an outcome within MAX_P_VALUE and MIN_EXPLAINED. The p-value is not
-    adjusted for the number of keys."""
+    """At most SHOWN keys that explain an outcome within MAX_P_VALUE and MIN_EXPLAINED."""
     keys = [
         entry for entry in ranking if entry["p_value"] <= MAX_P_VALUE and entry["explained"] >= MIN_EXPLAINED
     ][:SHOWN]

@@ -81,6 +81,14 @@ def test_an_event_that_the_last_level_reaches_is_known():
     assert found["low"] < p < found["high"]
 
 
+def test_a_score_that_most_flights_share_is_passed():
+    chains = Chains(1, 1)
+    chains.go(lambda points: np.where(points[:, 0] < 1.5, -9.0, points[:, 0] - 4.0))  # of 93 % of the flights
+    found = chains.estimate()
+    assert found["low"] < NormalDist().cdf(-4.0) < found["high"]
+    assert found["why"] == ""
+
+
 SWEEP = {
     "name": "drift",
     "base": {

@@ -67,23 +67,24 @@ class Chains:
             self._continue(going, np.array([levels[run] for run in going]), fly)
 
     def _level(self, run: int) -> float:
-        """The next level of a run: the score that the share SHARE of its flights reaches, at most 0.
-        Multiplies `share` by the share that reaches it, and sets `reached` and `stuck`."""
+        """The next level of a run, at most 0: the score that the share SHARE of its flights reaches, or the
+        next larger score if all flights reach this one. Multiplies `share` by the share that reaches the
+        level, and sets `reached` and `stuck`."""
         scores = self.scores[run]
         level = float(np.sort(scores)[-max(1, round(SHARE * scores.size))])
-        if not math.isfinite(level):  # too few flights have a score
+        if level == scores.min() < 0.0:  # at least nine tenths are equal: chains would start no closer
+            level = float(scores[scores > level].min(initial=math.inf))
+        if level == math.inf:  # all scores are equal
             self.stuck = True
             return level
-        level, self.reached[run] = min(level, 0.0), level >= 0.0
-        share = float((scores >= level).mean())
-        # every score reaches the level: at least nine tenths are equal, and chains would start no closer
-        self.stuck |= share == 1.0 and not self.reached[run]
-        self.share[run] *= share
+        level = min(level, 0.0)
+        self.reached[run] = level == 0.0
+        self.share[run] *= float((scores >= level).mean())
         return level
 
     def _continue(self, going: list[int], levels: np.ndarray, fly: FlyPoints) -> None:
         """Replace the flights of the runs `going` by Markov chains from flights that reached the level of
-        their run:
+        their run, some of them more than once if these are few:
 
             x' = STEP x + sqrt(1 - STEP^2) e,  e standard normal;  x' is accepted if it reaches the level,
             else x' = x
@@ -92,10 +93,8 @@ class Chains:
         """
         members = self.scores.shape[1]
         n_chains = max(1, round(SHARE * members))
-        chosen = np.array([
-            self._generator.choice(np.flatnonzero(self.scores[run] >= level), n_chains, replace=False)
-            for run, level in zip(going, levels, strict=True)
-        ])  # fmt: skip
+        starts = [np.flatnonzero(self.scores[run] >= level) for run, level in zip(going, levels, strict=True)]
+        chosen = np.array([self._generator.choice(i, n_chains, replace=i.size < n_chains) for i in starts])
         rows = np.array(going)[:, None]
         x = self.points[rows, chosen]
         scores = self.scores[rows, chosen]

@@ -83,6 +83,7 @@ def test_the_ends_of_the_unit_interval_stay_inside(u):
     assert abs(value_at(Variation(normal=(0.0, 1.0)), u)) < 10
     assert 0.1 <= value_at(Variation(loguniform=(0.1, 0.3)), u) <= 0.3
     assert value_at(Variation(choice=("a", "b")), u) in "ab"
+    assert value_at(Variation(linspace=(0.2, 0.8, 1)), u) == 0.2
 
 
 def test_flights_have_seeds_of_their_own():

@@ -84,11 +84,14 @@ def values_at(vary: Iterable[tuple[str, Variation]], point: Iterable[float]) -> 
 
 
 def counted_value(variation: Variation, position: int) -> Any:
-    """The value at a position of a `linspace` or `choice`; the last value of a `linspace` is exact."""
+    """The value at a position of a `linspace` or `choice`. Both ends of a `linspace` are exact, and the only
+    value of one is the first."""
     values = getattr(variation, variation.kind)
     if variation.kind == "choice":
         return values[position]
     first, last, count = values
+    if position == 0:
+        return first
     return last if position == count - 1 else first + position * (last - first) / (count - 1)
 
 

@@ -1,6 +1,7 @@
 """A study's cases kept as they land: whatever is killed, the rows are those of an undisturbed study."""
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -12,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from beaver_ftc.documents.errors import SimulationFailed, say_once
+from beaver_ftc.studies.engine.files import locked
 from beaver_ftc.studies.engine.identity import PACKAGE, hashed_files
 from beaver_ftc.studies.engine.study import Study, flown, fly_all, run_study
 
@@ -152,6 +154,20 @@ def test_two_processes_do_not_fly_the_same_study(tmp_path):
         pytest.raises(SimulationFailed, match="another beaver-ftc"),
     ):
         rows_of(tmp_path / "study", range(2), square)
+
+
+def test_the_lock_holds_until_the_rows_are_removed(tmp_path, monkeypatch):
+    remove = shutil.rmtree
+
+    def removed(folder, **options):
+        remove(folder, **options)
+        (tmp_path / ".study.flown").mkdir(exist_ok=True)
+        with pytest.raises(SimulationFailed, match="another beaver-ftc"), locked(tmp_path / ".study.flown"):
+            pass
+
+    monkeypatch.setattr(shutil, "rmtree", removed)
+    rows_of(tmp_path / "study", range(2), square)
+    assert hidden(tmp_path) == []
 
 
 ALL_IMPORTED = """

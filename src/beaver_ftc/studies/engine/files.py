@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import IO
@@ -38,6 +39,16 @@ def remove_leftovers(folder: Path) -> None:
     """Remove incomplete files that a killed process has left."""
     for partial in folder.rglob(".*.partial"):
         partial.unlink(missing_ok=True)
+
+
+def empty(folder: Path) -> None:
+    """Remove the content of a locked folder, as far as possible, without the lock: it holds until this is
+    done."""
+    for path in folder.iterdir():
+        if path.is_dir():
+            shutil.rmtree(path, ignore_errors=True)
+        elif path.name != LOCK:
+            path.unlink(missing_ok=True)
 
 
 @contextlib.contextmanager

@@ -12,7 +12,6 @@ same command reads them there and flies the other cases. The folder is removed w
 
 import contextlib
 import json
-import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -126,27 +125,32 @@ def _fly_pieces(
 
 @contextlib.contextmanager
 def _keeping(study: Study, out: Path) -> Iterator[store.Parts]:
-    """Yield the parts of a study, in its hidden folder, which is locked. The folder is removed at the end of
-    the block. If the block raises, it stays with the parts that have landed; without any, it is removed, and
-    so is `out` if it is new and empty."""
+    """Yield the parts of a study, in its hidden folder, which is locked. The folder is emptied at the end of
+    the block, and removed after the lock. If the block raises, it stays with the parts that have landed;
+    without any, it is removed, and so is `out` if it is new and empty."""
     hidden = out / f".{study.name}.flown"
     is_new = not out.exists()
     with clear_disk_errors(hidden):
         hidden.mkdir(parents=True, exist_ok=True)
-    with files.locked(hidden):
-        parts = _begin(hidden, study)
-        try:
-            yield parts
-        except BaseException as ended:
-            if parts and GO_ON not in str(ended):
-                say_once(f"{study.name}: stopped{GO_ON}")
-            if not parts:  # no rows to continue with
-                shutil.rmtree(hidden, ignore_errors=True)
-                with contextlib.suppress(OSError):
-                    if is_new:
-                        out.rmdir()
-            raise
-        shutil.rmtree(hidden, ignore_errors=True)
+    try:
+        with files.locked(hidden):
+            parts = _begin(hidden, study)
+            try:
+                yield parts
+            except BaseException as ended:
+                if not parts:  # no rows to continue with
+                    files.empty(hidden)
+                elif GO_ON not in str(ended):
+                    say_once(f"{study.name}: stopped{GO_ON}")
+                raise
+            files.empty(hidden)
+    finally:
+        with contextlib.suppress(
+            OSError
+        ):  # a folder with parts stays, and one that another process has locked
+            hidden.rmdir()
+            if is_new:
+                out.rmdir()
 
 
 def fly_all(fly: Fly, cases: Sequence[Any], workers: int, progress: Progress | None = None) -> list[Any]:

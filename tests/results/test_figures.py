@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.results.figures import draw, pictures_of
+from beaver_ftc.results.figures import draw, pictures_of, save
 from beaver_ftc.results.log import StoredLog
 from beaver_ftc.results.series import series_of
 from beaver_ftc.results.style import LOOKS, marks
@@ -19,6 +19,16 @@ def test_every_view_becomes_a_picture_with_its_closeups(log_path, found, tmp_pat
     assert {file.stem for file in files if "closeup" in file.stem} == {
         "detection-closeup", "candidates-closeup", "isolation-closeup",
     }  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", ["png", "pdf", "svg"])
+def test_the_same_flight_gives_the_same_bytes(log_path, found, tmp_path, kind):
+    file = tmp_path / f"tracking.{kind}"
+    (picture,) = [one for one in pictures_of(log_path, found, tmp_path, [kind]) if one.path == file]
+    save(picture)
+    first = file.read_bytes()
+    save(picture)
+    assert file.read_bytes() == first
 
 
 @pytest.fixture

@@ -77,14 +77,18 @@ def pictures_of(
 
 
 def save(picture: Picture) -> None:
-    """Draw a picture into its file; vector graphics in the style of a paper."""
+    """Draw a picture into its file; vector graphics in the style of a paper. The same flight gives the same
+    bytes."""
+    from matplotlib import rc_context
+
     kind = picture.path.suffix.removeprefix(".")
     style = "screen" if kind == "png" else "paper"
     figure = draw(picture.view, picture.series, picture.event_marks, picture.subtitle, style)
-    figure.savefig(picture.path, **_SAVE_OPTIONS_OF_FORMAT[kind])
+    with rc_context({"svg.hashsalt": SOFTWARE_MARK}):  # without it, the ids of elements in an SVG are random
+        figure.savefig(picture.path, **_SAVE_OPTIONS_OF_FORMAT[kind])
 
 
-# No date: the same flight gives the same PNG and PDF. The ids of elements in an SVG are random.
+# No date: it would differ in every run.
 _SAVE_OPTIONS_OF_FORMAT: Options = {
     # level 1 of zlib: files are a tenth larger than with level 6, in two thirds of the time
     "png": {"metadata": {"Software": SOFTWARE_MARK}, "pil_kwargs": {"compress_level": 1}},

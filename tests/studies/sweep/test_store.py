@@ -127,6 +127,11 @@ def test_another_sweep_is_not_resumed(store, short, old, new, named):
     assert caught.value.exit_code == 2
 
 
+def test_a_description_is_no_part_of_the_identity(short):
+    described = sweep_of(**{"expect: {}": "expect: {}, description: why", "seed": "description: why\nseed"})
+    assert identity_of(described) == identity_of(short)
+
+
 def test_other_versions_are_not_mixed(store, short):
     then = identity_of(short)
     then["versions"]["jsbsim"] = "0.9"

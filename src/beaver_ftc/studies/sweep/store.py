@@ -36,7 +36,8 @@ ROWS_PER_GROUP = 8192
 # The whole table is read, so that statistics of row groups are of no use. Most columns are numbers: no
 # dictionaries.
 _WRITE_OPTIONS: dict[str, Any] = {"compression": "snappy", "write_statistics": False, "use_dictionary": False}
-# Keys of a sweep file that change no flight. `base` and `set` are replaced by the resolved base.
+# Keys of a sweep file that change no flight. `base` and `set` are replaced by the resolved base, without its
+# description.
 _NOT_FLOWN = ("description", "expect", "base", "set")
 
 
@@ -44,8 +45,9 @@ def identity_of(sweep: Sweep, search: str | None = None) -> Document:
     """The identity of a sweep on this machine, as in `sweep.json`."""
     file = sweep.file.model_dump(mode="json", exclude_none=True)
     of_file = {key: value for key, value in file.items() if key not in _NOT_FLOWN}
+    base = {key: value for key, value in sweep.base.items() if key != "description"}
     aircraft = identity.digest_of_aircraft(sweep.aircraft.folder)
-    of_run = {"runs": sweep.flights, "base": sweep.base, "aircraft": aircraft, "search": search}
+    of_run = {"runs": sweep.flights, "base": base, "aircraft": aircraft, "search": search}
     return identity.of_request("sweep", {**of_file, **of_run})
 
 

@@ -22,8 +22,6 @@ from beaver_ftc.studies.sensitivity.mechanisms import (
     INSTRUMENTS,
     Flight,
     scenario_of,
-    with_key,
-    without_key,
     without_mechanism,
 )
 from beaver_ftc.studies.sensitivity.systems import DEFAULT, LAW, MECHANISMS, PAPER
@@ -172,7 +170,7 @@ def few_cells(monkeypatch):
 
 
 def rows_of(reason, key=DEFAULT):
-    keys = {f(mechanism) for mechanism in MECHANISMS for f in (with_key, without_key)}
+    keys = {key for mechanism in MECHANISMS for key in (mechanism.with_key, mechanism.without_key)}
     rows = [{each: outcome() for each in sorted(keys)} for _ in effects.cases_of(1)]
     rows[0][key] = outcome(false_alarm=True, delay_s=None, named=False, reason=reason)
     return rows

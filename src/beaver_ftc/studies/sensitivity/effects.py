@@ -11,7 +11,7 @@ from math import isfinite
 from beaver_ftc.results.metrics import versions
 from beaver_ftc.results.model import Document
 from beaver_ftc.studies.engine.statistics import CONFIDENCE, binomial, counted, median, or_never
-from beaver_ftc.studies.sensitivity.mechanisms import FACTORS, Flight, cases_of, with_key, without_key
+from beaver_ftc.studies.sensitivity.mechanisms import FACTORS, Flight, cases_of
 from beaver_ftc.studies.sensitivity.systems import MECHANISMS, SYSTEMS, Mechanism
 
 LATE_S = 0.1  # an alarm that is later by more than this is late
@@ -43,7 +43,7 @@ def document_of(seed: int, draws: int, rows: Outcomes, margins: list[Document]) 
 
 def _row_of(mechanism: Mechanism, cases: Sequence[Flight], rows: Outcomes) -> Document:
     """The row of a mechanism: its effect in all pairs, and by each value of each factor."""
-    pairs = [(row[with_key(mechanism)], row[without_key(mechanism)]) for row in rows]
+    pairs = [(row[mechanism.with_key], row[mechanism.without_key]) for row in rows]
     by_factor = {
         factor: {
             str(value): effect_of([*compress(pairs, (getattr(case, factor) == value for case in cases))])
@@ -150,7 +150,7 @@ def _alarms_of(key: str, rows: Outcomes) -> Document:
     """
     reasons = [row[key]["reason"] for row in rows if row[key]["false_alarm"]]
     worst_case = key not in [
-        with_key(mechanism) for mechanism in MECHANISMS if "fdi.statistical" in mechanism.present
+        mechanism.with_key for mechanism in MECHANISMS if "fdi.statistical" in mechanism.present
     ]
     explained = [r["undeclared"] > 0 and (r["certified"] is not False or not worst_case) for r in reasons]
     return {

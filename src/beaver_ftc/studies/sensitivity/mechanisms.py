@@ -70,6 +70,11 @@ AFTER_S = 8.0  # time that is flown after it
 RATE_HZ = 100.0
 AMPLITUDE_DEG_S = 3.0
 SWINGS_RAD_S = (1.0, 15.0)  # frequencies of the unstructured acceleration
+# The outcome of a flight that cannot be flown to its end.
+FAILED: Document = {
+    "failed": True, "false_alarm": False, "delay_s": None, "named": False, "tracking_deg_s": None,
+    "verdict": None, "reason": None,
+}  # fmt: skip
 
 
 class Flight(NamedTuple):
@@ -175,38 +180,12 @@ def fly_one(seed: int, flight: Flight) -> Document:
         scenario = scenario_of(flight, seed, system)
         outcomes[system] = outcome_of(scenario)
         for mechanism in (candidate for candidate in MECHANISMS if candidate.system == system):
-            if with_key(mechanism) not in outcomes:
-                outcomes[with_key(mechanism)] = outcome_of(scenario.with_(mechanism.present))
-            if without_key(mechanism) not in outcomes:
+            if mechanism.with_key not in outcomes:
+                outcomes[mechanism.with_key] = outcome_of(scenario.with_(mechanism.present))
+            if mechanism.without_key not in outcomes:
                 without = without_mechanism(scenario, mechanism)
-                outcomes[without_key(mechanism)] = outcome_of(without, mechanism.withheld)
+                outcomes[mechanism.without_key] = outcome_of(without, mechanism.withheld)
     return outcomes
-
-
-def with_key(mechanism: Mechanism) -> str:
-    """The key of the outcome with a mechanism: that of the whole system, unless the mechanism needs keys to
-    be present."""
-    return f"with {mechanism.key}" if mechanism.present else mechanism.system
-
-
-def without_key(mechanism: Mechanism) -> str:
-    """The key of the outcome without a mechanism: that of the whole system if the system does not have it by
-    itself."""
-    return f"without {mechanism.key}" if mechanism.without or mechanism.withheld else mechanism.system
-
-
-class Outfit(NamedTuple):
-    """A system and its mechanisms in words."""
-
-    system: str
-    mechanisms: str = "all"
-
-
-FLOWN = {  # by key of an outcome
-    **{with_key(each): Outfit(each.system, f"with {each.name}") for each in MECHANISMS},
-    **{without_key(each): Outfit(each.system, f"without {each.name}") for each in MECHANISMS},
-    **{system: Outfit(system) for system in SYSTEMS},  # last, in place of equal keys above
-}
 
 
 def withhold(withheld: str, loop: Loop) -> Callable[[], None]:
@@ -214,11 +193,7 @@ def withhold(withheld: str, loop: Loop) -> Callable[[], None]:
     the flight, the returned function has nothing to do."""
     if withheld:
         withhold_from_law(loop.frames[0], withheld)
-    return _do_nothing
-
-
-def _do_nothing() -> None:
-    """Nothing to do at the end of a flight."""
+    return lambda: None
 
 
 def outcome_of(scenario: Scenario, withheld: str = "") -> Document:
@@ -238,12 +213,6 @@ def outcome_of(scenario: Scenario, withheld: str = "") -> Document:
         "verdict": [detection.time_s, isolation.fault, isolation.time_s],
         "reason": reason_of(scenario) if metrics.false_alarm else None,
     }
-
-
-FAILED: Document = {
-    "failed": True, "false_alarm": False, "delay_s": None, "named": False, "tracking_deg_s": None,
-    "verdict": None, "reason": None,
-}  # fmt: skip
 
 
 def _tracking(metrics: Metrics) -> float | None:

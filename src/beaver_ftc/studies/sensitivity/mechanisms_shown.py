@@ -9,8 +9,7 @@ from beaver_ftc.results.model import Document
 from beaver_ftc.studies.present.figures import GRID, SERIES, draw_estimates, label_edges, panels
 from beaver_ftc.studies.present.page import Heading, Part, Pictures, Table, study_files, table, versions_line
 from beaver_ftc.studies.present.tables import Columns, bare_percent, estimate, number, number_or_never
-from beaver_ftc.studies.sensitivity.mechanisms import FLOWN
-from beaver_ftc.studies.sensitivity.systems import DEFAULT, PAPER
+from beaver_ftc.studies.sensitivity.systems import DEFAULT, MECHANISMS, PAPER, SYSTEMS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -150,9 +149,14 @@ MEDIANS = (
     ("error without, deg/s", "tracking_deg_s.without.value", number_or_never),
     *_with_interval("error ratio", "tracking_ratio"),
 )
+FLOWN = {  # by key of an outcome: the system, and its mechanisms in words
+    **{mechanism.with_key: (mechanism.system, f"with {mechanism.name}") for mechanism in MECHANISMS},
+    **{mechanism.without_key: (mechanism.system, f"without {mechanism.name}") for mechanism in MECHANISMS},
+    **{system: (system, "all") for system in SYSTEMS},  # last, in place of equal keys above
+}
 ALARMS = (
-    ("system", lambda row: FLOWN[row["flown"]].system),
-    ("mechanisms", lambda row: FLOWN[row["flown"]].mechanisms), ("false alarms", "count"),
+    ("system", lambda row: FLOWN[row["flown"]][0]),
+    ("mechanisms", lambda row: FLOWN[row["flown"]][1]), ("false alarms", "count"),
     ("with an undeclared error", "undeclared"), ("certified", _certified),
     ("unexplained", lambda row: str(row["unexplained"]) if row["worst_case"] else "-"),
 )  # fmt: skip

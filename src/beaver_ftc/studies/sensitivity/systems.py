@@ -41,6 +41,16 @@ class Mechanism(NamedTuple):
         """Its name, unique over the systems."""
         return f"{self.system}: {self.name}"
 
+    @property
+    def with_key(self) -> str:
+        """The key of the outcome with it: that of the whole system, unless it needs keys to be present."""
+        return f"with {self.key}" if self.present else self.system
+
+    @property
+    def without_key(self) -> str:
+        """The key of the outcome without it: that of the whole system, if this does not have it by itself."""
+        return f"without {self.key}" if self.without or self.withheld else self.system
+
 
 MECHANISMS = (
     Mechanism(PAPER, "adaptive thresholds", DIAGNOSIS, {"fdi.options.adaptive_threshold": 0}),

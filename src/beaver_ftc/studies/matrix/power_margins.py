@@ -9,11 +9,10 @@ from beaver_ftc.plant.trim import trim
 from beaver_ftc.results.model import Document
 from beaver_ftc.scenario.airframe import Initial
 from beaver_ftc.scenario.diagnosis import EnginePower
-from beaver_ftc.studies.linear_systems import zeros
+from beaver_ftc.studies.linear_systems import LONGITUDINAL, zeros
 from beaver_ftc.studies.present.tables import finite
 
 POWER = EnginePower()
-STATES = ("airspeed", "alpha", "q", "theta")
 FREQUENCIES_RAD_S = np.geomspace(1e-3, 1e2, 20001)
 SLOW_RAD_S = 1.0  # the phugoid is slower, the short period faster
 
@@ -29,7 +28,7 @@ def margins(airspeed_mps: float) -> Document:
     model, power, trim_inhg = about_trim(airspeed_mps)
     A = model.A
     F, b, k = with_law(A, power)
-    q = STATES.index("q")
+    q = LONGITUDINAL.index("q")
     upper_db, lower_db, phase_deg = margins_of(loop_response(F, b, k))
     from_trim_inhg = np.array([POWER.lowest_inhg, POWER.highest_inhg]) - trim_inhg
     return {
@@ -37,7 +36,7 @@ def margins(airspeed_mps: float) -> Document:
         "phugoid_damping": [_phugoid_damping(system) for system in (A, F + np.outer(b, k))],
         "gain_margin_db": finite(float(min(upper_db, lower_db))),
         "phase_margin_deg": finite(float(phase_deg)),
-        "attitude_zero_rad_s": float(zeros(A, power, STATES.index("theta")).real.max()),
+        "attitude_zero_rad_s": float(zeros(A, power, LONGITUDINAL.index("theta")).real.max()),
         "worth_deg": np.rad2deg(
             from_trim_inhg * power[q] / model.B[q, model.inputs.index("elevator")]
         ).tolist(),
@@ -45,13 +44,13 @@ def margins(airspeed_mps: float) -> Document:
 
 
 def about_trim(airspeed_mps: float) -> tuple[LinearModel, np.ndarray, float]:
-    """The linear aircraft over STATES, the effect (4,) of manifold pressure on them, per inHg, and the
+    """The linear aircraft over LONGITUDINAL, the effect (4,) of manifold pressure on them, per inHg, and the
     pressure in trim, inHg."""
     plant = Plant(100)
     point = trim(airspeed_mps, Initial().altitude_m)
     model = differences(plant, point)
-    rows = [model.states.index(name) for name in STATES]
-    return model.of(STATES), engine_slope(plant, point)[rows], point.manifold_pressure_inhg
+    rows = [model.states.index(name) for name in LONGITUDINAL]
+    return model.of(LONGITUDINAL), engine_slope(plant, point)[rows], point.manifold_pressure_inhg
 
 
 def with_law(A: np.ndarray, power: np.ndarray) -> tuple[np.ndarray, ...]:
@@ -63,8 +62,8 @@ def with_law(A: np.ndarray, power: np.ndarray) -> tuple[np.ndarray, ...]:
     v: smoothed airspeed; v0: its slow mean; e: missed attitude. Of the states (x, v, v0, e): system matrix
     F (7, 7), column b (7,) of u, and row k (7,) of the law, u = k (x, v, v0, e).
     """
-    V, q = STATES.index("airspeed"), STATES.index("q")
-    n = len(STATES)
+    V, q = LONGITUDINAL.index("airspeed"), LONGITUDINAL.index("q")
+    n = len(LONGITUDINAL)
     v, v0, e = range(n, n + 3)
     F = np.zeros((n + 3, n + 3))
     F[:n, :n] = A

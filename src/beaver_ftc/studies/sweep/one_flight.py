@@ -43,14 +43,10 @@ FIXED = {"run": "int", "seed": "int", "status": "text", "reason": "text"}
 def kind_of(variation: Variation) -> str:
     """The type of the column of a varied key: numbers and flags as they are; all else as text, sections as
     JSON."""
-    if variation.choice is None:
-        return "float"
-    if all(isinstance(value, bool) for value in variation.choice):
+    types = {type(value) for value in variation.choice or (0.0,)}
+    if types == {bool}:
         return "flag"
-    numbers = all(
-        isinstance(value, int | float) and not isinstance(value, bool) for value in variation.choice
-    )
-    return "float" if numbers else "text"
+    return "float" if types <= {int, float} else "text"
 
 
 def as_cell(value: Any, kind: str) -> Any:

@@ -146,9 +146,8 @@ class Store:
         if not self.results.exists():
             return None
         try:
-            with self.results.open(
-                "rb"
-            ) as file:  # opened here: Arrow would read a folder as a table of many files
+            # opened here: Arrow would read a folder as a table of many files
+            with self.results.open("rb") as file:
                 return read_table(file)
         except (ArrowException, OSError, ValueError):
             files.set_aside(self.results, files.UNREADABLE)

@@ -148,14 +148,6 @@ def test_a_failure_before_the_first_row_leaves_nothing(tmp_path):
     assert hidden(tmp_path / "there") == []
 
 
-def test_two_processes_do_not_fly_the_same_study(tmp_path):
-    with (
-        flown(study_of(tmp_path / "study", range(2), square), tmp_path),
-        pytest.raises(SimulationFailed, match="another beaver-ftc"),
-    ):
-        rows_of(tmp_path / "study", range(2), square)
-
-
 def test_the_lock_holds_until_the_rows_are_removed(tmp_path, monkeypatch):
     remove = shutil.rmtree
 

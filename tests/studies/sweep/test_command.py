@@ -42,13 +42,6 @@ def test_text_says_the_verdict_and_a_replay_is_a_run(call, tmp_path):
     assert (tmp_path / "runs" / "short" / "flights" / "short-0003" / "metrics.json").exists()
 
 
-def test_a_mistake_is_in_the_json_too(call):
-    status, answer, complaints = call(SHORT.replace("seed: 3", "sed: 3"), "--format", "json")
-    assert status == 2
-    assert json.loads(answer)["errors"] == complaints.splitlines()
-    assert "did you mean seed?" in complaints
-
-
 @pytest.mark.parametrize(
     ("text", "arguments", "says"),
     [

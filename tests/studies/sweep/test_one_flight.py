@@ -9,8 +9,6 @@ from beaver_ftc.studies.sweep.one_flight import (
 )
 from beaver_ftc.studies.sweep.sampling import Assignment, Plan, flight_seed
 
-from .conftest import SHORT, sweep_of
-
 
 def test_a_row_says_what_the_flights_metrics_say(short):
     from beaver_ftc.loop.loop import fly
@@ -27,20 +25,6 @@ def test_a_row_says_what_the_flights_metrics_say(short):
     assert row["tracking.post_fault_rms_deg_s.q"] == document["tracking"]["post_fault_rms_deg_s"]["q"]
     assert row["saturation_s.elevator"] == document["saturation_s"]["elevator"]
     assert row["fault_free_s"] == 0.5
-
-
-def test_a_flight_that_cannot_be_trimmed_is_a_row_with_its_reason():
-    sweep = sweep_of(SHORT.replace("{normal: [45, 3], within: [36, 54]}", "{choice: [20, 45]}"))
-    row = fly_one(sweep, Assignment(0, {"initial.airspeed_mps": 20.0}))
-    assert row["status"] == "bad_input"
-    assert "20 m/s" in row["reason"]
-    assert row["detection.detected"] is None
-
-
-def test_values_that_contradict_each_other_are_a_row_too(short):
-    row = fly_one(short, Assignment(0, {"faults[0].at_s": 2.0}))
-    assert row["status"] == "bad_input"
-    assert row["reason"].startswith("faults[0].at_s: 2 is after the end")
 
 
 def test_a_drawn_value_out_of_range_is_named_by_its_key_though_the_base_lacks_it(short):

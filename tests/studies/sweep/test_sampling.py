@@ -3,7 +3,7 @@ import pytest
 from scipy import stats
 
 from beaver_ftc.scenario.sweeps import Variation
-from beaver_ftc.studies.sweep.sampling import Plan, flight_seed, value_at
+from beaver_ftc.studies.sweep.sampling import Plan, value_at
 
 from .conftest import sweep_of
 
@@ -84,9 +84,3 @@ def test_the_ends_of_the_unit_interval_stay_inside(u):
     assert 0.1 <= value_at(Variation(loguniform=(0.1, 0.3)), u) <= 0.3
     assert value_at(Variation(choice=("a", "b")), u) in "ab"
     assert value_at(Variation(linspace=(0.2, 0.8, 1)), u) == 0.2
-
-
-def test_flights_have_seeds_of_their_own():
-    seeds = {flight_seed(sweep, index) for sweep in (0, 1) for index in range(2000)}
-    assert len(seeds) == 4000
-    assert all(0 <= seed < 2**63 for seed in seeds)

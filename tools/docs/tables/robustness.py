@@ -18,7 +18,7 @@ from beaver_ftc.studies.detectability.schemes import GRIDS, contenders
 from beaver_ftc.studies.detectability.schemes_shown import who_is_better
 from beaver_ftc.studies.engine.statistics import share_within, wilson
 from beaver_ftc.studies.engine.study import fly_all, run_into, run_study
-from beaver_ftc.studies.matrix.clairvoyant import columns_of, informed_row
+from beaver_ftc.studies.matrix.informed import columns_of, informed_row
 from beaver_ftc.studies.present.tables import markdown_table, tabulated
 from beaver_ftc.studies.sensitivity.beyond import TOGETHER
 from beaver_ftc.studies.sensitivity.command import errors_study

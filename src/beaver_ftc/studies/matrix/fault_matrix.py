@@ -31,7 +31,7 @@ from beaver_ftc.scenario.schema import load as load_scenario
 from beaver_ftc.studies.detectability.certain import axis_of
 from beaver_ftc.studies.detectability.places import usual_airspeeds
 from beaver_ftc.studies.engine.study import Study
-from beaver_ftc.studies.matrix.clairvoyant import columns_of, informed_row
+from beaver_ftc.studies.matrix.informed import columns_of, informed_row
 from beaver_ftc.studies.matrix.matrix_shown import FILES, NAME, VERDICTS
 from beaver_ftc.studies.reproduce.choices import SETTING
 

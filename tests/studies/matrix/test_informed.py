@@ -10,8 +10,8 @@ from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.log import Columns
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.studies.matrix.clairvoyant import columns_of, informed_row
 from beaver_ftc.studies.matrix.fault_matrix import FaultCase, informed_counts, scenario_of, trimmed_deg
+from beaver_ftc.studies.matrix.informed import columns_of, informed_row
 from telling import apart
 
 AIRCRAFT = load()

@@ -79,11 +79,12 @@ def of_model(linear: LinearModel, airspeed_mps: float, where: str) -> Qualities:
     alpha = linear.states.index("alpha")
     g_per_rad = -linear.A[alpha, alpha] * airspeed_mps / GRAVITY_MPS2
     values = _values(modes(linear.of(CLASSICAL).A), float(g_per_rad))
-    return [
-        Quality(where, airspeed_mps, *key, values[key], limit.level(values[key]))
-        for limit in LIMITS
-        for key in [(limit.mode, limit.quantity)]
-    ]
+    qualities = []
+    for limit in LIMITS:
+        value = values[limit.mode, limit.quantity]
+        level = limit.level(value)
+        qualities.append(Quality(where, airspeed_mps, limit.mode, limit.quantity, value, level))
+    return qualities
 
 
 def _values(by_name: Mapping[str, Mode], g_per_rad: float) -> dict[tuple[str, str], float]:
@@ -160,9 +161,10 @@ def over_airspeeds(scenario: Scenario) -> Qualities:
 def as_text(rows: list[Document]) -> str:
     """A line for each flight condition, a column for each quantity, with the level in brackets; the last
     column has the worst level."""
-    head = [["aircraft alone,", *(limit.mode for limit in LIMITS), ""]]
-    head += [["airspeed, m/s", *(f"{row.quantity} {row.unit}".strip() for row in LIMITS), "level"]]
-    lines = []
+    lines = [
+        ["aircraft alone,", *(limit.mode for limit in LIMITS), ""],
+        ["airspeed, m/s", *(f"{limit.quantity} {limit.unit}".strip() for limit in LIMITS), "level"],
+    ]
     for (where, airspeed_mps), rows_of_condition in grouped(rows, "where", "airspeed_mps").items():
         ended = " at the end" if where == "at the end" else ""
         cells = [
@@ -171,9 +173,9 @@ def as_text(rows: list[Document]) -> str:
         lines.append(
             [f"{airspeed_mps:.1f}{ended}", *cells, level_text(max(row["level"] for row in rows_of_condition))]
         )
-    clauses = ", ".join(dict.fromkeys(f"{row.clause} {row.table}".strip() for row in LIMITS))
+    clauses = ", ".join(dict.fromkeys(f"{limit.clause} {limit.table}".strip() for limit in LIMITS))
     legend = f"in brackets: level of MIL-F-8785C, class I, category B:\n{clauses}"
-    return f"{aligned([*head, *lines])}\n\n{legend}"
+    return f"{aligned(lines)}\n\n{legend}"
 
 
 def level_text(level: int) -> str:

@@ -57,7 +57,7 @@ def _grouped(document: Document) -> str:
 
 def _signs(row: Document) -> tuple[bool, bool]:
     """Whether a criterion is worse without the mechanism beyond chance, and whether one is better."""
-    found = [row[name] for name in shown.CRITERIA]
+    found = [row[name] for name in shown.CRITERION_WORDS]
     return any(one["low"] > 0.0 for one in found), any(one["high"] < 0.0 for one in found)
 
 

@@ -81,14 +81,8 @@ def draw_estimates(
     """Draw values with bars for their intervals. places: on the other axis. estimates: `value`, `low` and
     `high` of each, None or NaN for none. times: factor on the values. across: the values are on the
     horizontal axis."""
-    ends = (
-        np.array(
-            [[estimate["value"], estimate["low"], estimate["high"]] for estimate in estimates], dtype=float
-        )
-        .reshape(-1, 3)
-        .T
-    )
-    value, low, high = times * ends
+    rows = [[estimate[key] for key in ("value", "low", "high")] for estimate in estimates]
+    value, low, high = times * np.array(rows, dtype=float).reshape(-1, 3).T
     bars = np.maximum(value - low, 0.0), np.maximum(high - value, 0.0)
     if across:
         axes.errorbar(value, places, xerr=bars, **look)

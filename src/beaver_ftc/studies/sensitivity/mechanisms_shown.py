@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 NAME = "sensitivity"
-CRITERIA = {  # criteria of effects.py: words in tables
+CRITERION_WORDS = {  # by criterion of effects.py
     "false_alarms": "false alarms",
     "late": "late alarms",
     "names": "lost names",
@@ -76,14 +76,15 @@ def mechanism_sentence(row: Document) -> str:
     if row["same_verdict"] == row["same_tracking"] == flights:
         return f"{label(row)}: without it all {flights} flights are the same."
     changed_criteria = {
-        name: row[name] for name in CRITERIA if row[name]["low"] > 0.0 or row[name]["high"] < 0.0
+        name: row[name] for name in CRITERION_WORDS if row[name]["low"] > 0.0 or row[name]["high"] < 0.0
     }
     if not changed_criteria:
         changed = flights - row["same_verdict"]
         differ = f"{changed} of {flights} verdicts differ" if changed else "no verdict differs"
         return f"{label(row)}: without it {differ}, and no criterion changes beyond chance."
     texts = (
-        f"{CRITERIA[name]} {100 * effect['value']:+.1f} points" for name, effect in changed_criteria.items()
+        f"{CRITERION_WORDS[name]} {100 * effect['value']:+.1f} points"
+        for name, effect in changed_criteria.items()
     )
     return f"{label(row)}: without it, {', '.join(texts)}."
 
@@ -135,7 +136,7 @@ def _certified(row: Document) -> str:
 MECHANISM = ("mechanism", label)
 NET = (
     MECHANISM,
-    *(column for name, words in CRITERIA.items()
+    *(column for name, words in CRITERION_WORDS.items()
       for column in _with_interval(f"{words}, points", name, net_points)),
 )  # fmt: skip
 SAME = (
@@ -171,8 +172,8 @@ def draw_mechanisms(document: Document) -> "Figure":
     """A panel for each criterion, a dot with its interval for each mechanism. To the right of 0, the
     mechanism helps."""
     rows = document["mechanisms"]
-    figure, grid = panels(1, len(CRITERIA), 13.0, 0.28 * len(rows) + 1.4, sharey=True)
-    for panel, (name, words) in zip(grid[0], CRITERIA.items(), strict=True):
+    figure, grid = panels(1, len(CRITERION_WORDS), 13.0, 0.28 * len(rows) + 1.4, sharey=True)
+    for panel, (name, words) in zip(grid[0], CRITERION_WORDS.items(), strict=True):
         for colour, system in zip(SERIES, (PAPER, DEFAULT), strict=False):
             places = [place for place, row in enumerate(rows) if row["system"] == system]
             draw_estimates(

@@ -9,7 +9,7 @@ import numpy as np
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.results.metrics import strikes_within
 from beaver_ftc.scenario.sweeps import Sweep
-from beaver_ftc.studies.sweep.one_flight import DEPARTED, FLOWN, kind_of
+from beaver_ftc.studies.sweep.one_flight import DEPARTED, RESULTS, kind_of
 
 NO_FAULT = "no fault"
 
@@ -39,7 +39,7 @@ class Flights:
     @cached_property
     def measured(self) -> np.ndarray:
         """Flights that have metrics."""
-        return np.isin(self["status"], (FLOWN, DEPARTED))
+        return np.isin(self["status"], RESULTS)
 
     @cached_property
     def departed(self) -> np.ndarray:

@@ -68,10 +68,10 @@ class RowsAsParquet:
         """The table in a file if it has these runs."""
         from pyarrow.parquet import read_table
 
-        return self.if_of(runs, read_table(path))
+        return self.of_runs(runs, read_table(path))
 
-    def if_of(self, runs: Sequence[int], table: "pa.Table") -> "pa.Table | None":
-        """The table if it has these runs and the columns of the sweep."""
+    def of_runs(self, runs: Sequence[int], table: "pa.Table") -> "pa.Table | None":
+        """The table if it has these runs and the columns of the sweep, otherwise None."""
         fits = table.schema.equals(self.schema) and table.column("run").to_pylist() == list(runs)
         return table if fits else None
 
@@ -134,7 +134,7 @@ class Store:
         """The table of a batch from its part, or else from `results.parquet`; None if it has not landed."""
         table = self.parts.landed(batch, runs)
         if table is None and self._compacted is not None:
-            return self._codec.if_of(runs, self._compacted.slice(runs[0], len(runs)))
+            return self._codec.of_runs(runs, self._compacted.slice(runs[0], len(runs)))
         return table
 
     @cached_property

@@ -90,7 +90,7 @@ def expectations(summary: Document) -> list[tuple[str, str, str, bool]]:
     return [
         (
             expectation["name"],
-            expected(expectation["expected"]),
+            limit_text(expectation["expected"]),
             value(expectation["actual"]),
             expectation["passed"],
         )
@@ -104,7 +104,7 @@ def verdict(summary: Document) -> Judged:
         Expectation(
             f"{expectation['name']}.{_side(expectation['expected'])}",
             expectation["passed"],
-            expected(expectation["expected"]),
+            limit_text(expectation["expected"]),
             f"{value(expectation['actual'])} of {expectation['of']} flights",
         )
         for expectation in summary["expectations"]
@@ -112,7 +112,7 @@ def verdict(summary: Document) -> Judged:
     return Judged(summary["sweep"], summary["passed"], tuple(bounds))
 
 
-def expected(level: Document) -> str:
+def limit_text(level: Document) -> str:
     """An expected limit in words, such as `95 % quantile ≤ 0.5 with 95 % confidence`."""
     quantile = f"{exact_percent(level['quantile'])} quantile " if "quantile" in level else ""
     side = _side(level)
@@ -133,6 +133,11 @@ def exact_percent(share: float | None) -> str:
     digits = 1 if distance >= 0.01 or not distance else max(2, -floor(log10(100.0 * distance)))
     text = f"{100 * share:.{digits}f}"
     return f"{text.rstrip('0').rstrip('.')} %"
+
+
+def _interval(rate: Document) -> str:
+    """The interval of a rate."""
+    return f"{exact_percent(rate['low'])} to {exact_percent(rate['high'])}"
 
 
 def summary_text(summary: Document, colour: bool = False) -> str:
@@ -234,6 +239,21 @@ def _drivers(ranking: list[Document]) -> str:
     )
 
 
+BY_FAULT = (
+    ("fault", "fault"), ("flights", "flights"), ("detected", "detection.rate", exact_percent),
+    ("95 % interval", "detection", _interval), ("delay: median", "detection.delay_s.median", _seconds),
+    ("95 %", "detection.delay_s.p95", _seconds), ("max", "detection.delay_s.max", _seconds),
+    ("named rightly", "isolation.rate", exact_percent), ("95 % interval", "isolation", _interval),
+    ("named wrongly", "isolation.wrong.count"),
+)  # fmt: skip
+WORST = (("flight", "run"), ("why", "why", "; ".join), ("flies it again", "replay"))
+SENSITIVITY = (
+    ("outcome", "outcome"), ("key", "key"), ("explained", "explained", value),
+    ("correlation", "rank_correlation", value), ("p", "p_value", value),
+)  # fmt: skip
+FAILED = (("flights", "count"), ("why", "reason"), ("first", "first_run"))
+
+
 def render(summary: Document, folder: Path) -> str:
     """The report as HTML text, from the summary, and from the figures and flights in the folder of the
     sweep."""
@@ -272,26 +292,6 @@ def _parts(summary: Document, folder: Path, figures: Mapping[str, Path]) -> list
 def _section(heading: str, head: Sequence[str], rows: Rows) -> list[Part]:
     """A heading and its table; no part without rows."""
     return [Heading(heading), Table(head, rows)] if rows else []
-
-
-def _interval(rate: Document) -> str:
-    """The interval of a rate."""
-    return f"{exact_percent(rate['low'])} to {exact_percent(rate['high'])}"
-
-
-BY_FAULT = (
-    ("fault", "fault"), ("flights", "flights"), ("detected", "detection.rate", exact_percent),
-    ("95 % interval", "detection", _interval), ("delay: median", "detection.delay_s.median", _seconds),
-    ("95 %", "detection.delay_s.p95", _seconds), ("max", "detection.delay_s.max", _seconds),
-    ("named rightly", "isolation.rate", exact_percent), ("95 % interval", "isolation", _interval),
-    ("named wrongly", "isolation.wrong.count"),
-)  # fmt: skip
-WORST = (("flight", "run"), ("why", "why", "; ".join), ("flies it again", "replay"))
-SENSITIVITY = (
-    ("outcome", "outcome"), ("key", "key"), ("explained", "explained", value),
-    ("correlation", "rank_correlation", value), ("p", "p_value", value),
-)  # fmt: skip
-FAILED = (("flights", "count"), ("why", "reason"), ("first", "first_run"))
 
 
 def _link(folder: Path, name: str) -> str | None:

@@ -5,7 +5,7 @@ import pytest
 
 from beaver_ftc.control.laws import loop_design
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.studies.margins import at, study
+from beaver_ftc.studies.margins import at, over_airspeeds
 from beaver_ftc.studies.margins_loop import OpenLoop, frequencies, loops
 from flying import flown, scenario
 
@@ -34,7 +34,7 @@ def test_three_integrators_are_the_design_loop(loop):
 
 @pytest.mark.parametrize("given", [OURS, REAL], ids=["ideal", "real"])
 def test_every_loop_over_the_envelope_keeps_what_is_asked(given):
-    found = study(scenario(**given))
+    found = over_airspeeds(scenario(**given))
     assert {each.surface for each in found} == {"aileron", "elevator", "rudder", "flap"}
     assert len({each.airspeed_mps for each in found}) == 5
     assert [each for each in found if not each.keeps(6.0, 45.0)] == []
@@ -42,7 +42,7 @@ def test_every_loop_over_the_envelope_keeps_what_is_asked(given):
 
 def test_a_law_that_has_no_such_loop_is_refused():
     with pytest.raises(BadInput, match="allowed: fault-tolerant, oracle"):
-        study(scenario(control={"law": "nominal"}))
+        over_airspeeds(scenario(control={"law": "nominal"}))
 
 
 @pytest.mark.parametrize(("share", "steady"), [(0.85, True), (1.2, False)])

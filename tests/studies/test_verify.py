@@ -105,7 +105,7 @@ def test_a_false_alarm_in_healthy_flight_is_counted_per_hour():
         "alarm": True,
         "departed": False,
         "outside_s": 0.0,
-        "closest": [1.2, 1.3],
+        "closest": {"published": 1.2, "sharpened": 1.3},
     }
     healthy = summarise({"healthy": [row] * 2, "faulty": []})["healthy"]
     assert healthy["false_alarms_per_hour"] == 2.0

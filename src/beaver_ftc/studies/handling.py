@@ -24,7 +24,7 @@ from beaver_ftc.plant.conditions import trimmed
 from beaver_ftc.plant.linear import LinearModel, differences
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.linear_systems import CLASSICAL, Mode, modes
-from beaver_ftc.studies.margins import N_AIRSPEEDS, over_envelope
+from beaver_ftc.studies.margins import over_envelope
 from beaver_ftc.studies.present.tables import aligned, grouped, number
 
 WORSE = 4  # in place of a level: worse than level 3
@@ -148,9 +148,7 @@ def over_airspeeds(scenario: Scenario) -> Qualities:
     from beaver_ftc.loop.loop import fly
     from beaver_ftc.results.log import MemoryLog
 
-    qualities = [
-        quality for flight in over_envelope(scenario, N_AIRSPEEDS) for quality in where_trimmed(flight)
-    ]
+    qualities = [quality for flight in over_envelope(scenario) for quality in where_trimmed(flight)]
     if scenario.faults:
         log = MemoryLog()
         if fly(scenario, log).departure is None:

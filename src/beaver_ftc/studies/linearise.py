@@ -36,7 +36,7 @@ class Linearise(StudyCommand):
         """The margins and the handling qualities over the airspeeds."""
         scenario = load({} if self.scenario is None else self.scenario)
         required = scenario.control.gain_margin_db, scenario.control.phase_margin_deg
-        document = margins.as_document(margins.study(scenario), required)
+        document = margins.as_document(margins.over_airspeeds(scenario), required)
         return document | {
             "handling": [all_finite(asdict(quality)) for quality in handling.over_airspeeds(scenario)]
         }

@@ -55,16 +55,16 @@ class Margin:
         return min(self.up_db, self.down_db) >= gain_db and self.phase_deg >= phase_deg
 
 
-def study(scenario: Scenario) -> list[Margin]:
+def over_airspeeds(scenario: Scenario) -> list[Margin]:
     """The margins of the default law over the envelope, with actuators, sensors and frame rate of a scenario.
 
     Raises BadInput for another law.
     """
     refuse_other_laws(scenario)
-    return [margin for flight in over_envelope(scenario, N_AIRSPEEDS) for margin in at(flight)]
+    return [margin for flight in over_envelope(scenario) for margin in at(flight)]
 
 
-def over_envelope(scenario: Scenario, count: int) -> Iterator[Scenario]:
+def over_envelope(scenario: Scenario, count: int = N_AIRSPEEDS) -> Iterator[Scenario]:
     """The scenario at `count` airspeeds, evenly spaced from the slowest to the fastest of the envelope."""
     ends_mps = scenario.airframe.envelope.airspeed_mps
     return (scenario.with_({"initial.airspeed_mps": float(V)}) for V in np.linspace(*ends_mps, count))
@@ -186,9 +186,9 @@ def sensors(scenario: Scenario, m: int, dt: float) -> np.ndarray:
     return delay_and_pole
 
 
-def as_document(margins: list[Margin], required: tuple[float, float]) -> Document:
+def as_document(judged: list[Margin], required: tuple[float, float]) -> Document:
     """The document of `--format json`. An infinite margin is null."""
-    rows = [all_finite(asdict(margin)) | {"keeps": margin.keeps(*required)} for margin in margins]
+    rows = [all_finite(asdict(margin)) | {"keeps": margin.keeps(*required)} for margin in judged]
     return {"gain_margin_db": required[0], "phase_margin_deg": required[1], "margins": rows}
 
 

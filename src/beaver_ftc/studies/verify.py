@@ -71,7 +71,7 @@ def _healthy(draw: Draw) -> Row:
         "alarm": flight.detection_time_s is not None,
         "departed": flight.departure is not None,
         "outside_s": flight.outside_s,
-        "closest": [of_filters[0], max(of_filters)],
+        "closest": {PUBLISHED: of_filters[0], SHARPENED: max(of_filters)},
     }
 
 
@@ -164,8 +164,7 @@ def summarise(rows: dict[str, list[Row]]) -> Document:
 
 
 def _healthy_document(rows: Sequence[Row]) -> Document:
-    """False alarms and flight hours of the healthy flights. `closest` of a row has a value for each of
-    SCHEMES, in their order."""
+    """False alarms and flight hours of the healthy flights."""
     hours = sum(row["watched_s"] for row in rows) / 3600.0
     alarms = sum(row["alarm"] for row in rows)
     return {
@@ -177,7 +176,7 @@ def _healthy_document(rows: Sequence[Row]) -> Document:
         "departures": sum(row["departed"] for row in rows),
         "hours_outside_envelope": sum(row["outside_s"] for row in rows) / 3600.0,
         "closest_approach": {
-            scheme: max(row["closest"][i] for row in rows) for i, scheme in enumerate(SCHEMES) if rows
+            scheme: max(row["closest"][scheme] for row in rows) for scheme in SCHEMES if rows
         },
     }
 

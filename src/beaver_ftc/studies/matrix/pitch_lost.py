@@ -34,6 +34,11 @@ LOST: dict[str, tuple[float | None, float]] = {
     "elevator -4 deg": (-4.0, 0.0), "elevator -8 deg": (-8.0, 0.0),
     "flap 10 deg down": (0.0, 10.0), "flap 20 deg down": (0.0, 20.0),
 }  # fmt: skip
+LEGEND = (
+    f"cell: RMS pitch rate in deg/s, and swing of the pitch attitude in deg, from {SETTLED_S:g} s on;\n"
+    "without engine power > with it. lost: the aircraft departed. *: outside the validated envelope for a\n"
+    "while, even with power."
+)
 
 
 class PitchCase(NamedTuple):
@@ -111,13 +116,6 @@ def document_of(rows: list[Document], airspeeds_mps: Sequence[float]) -> Documen
     }
 
 
-LEGEND = (
-    f"cell: RMS pitch rate in deg/s, and swing of the pitch attitude in deg, from {SETTLED_S:g} s on;\n"
-    "without engine power > with it. lost: the aircraft departed. *: outside the validated envelope for a\n"
-    "while, even with power."
-)
-
-
 def as_text(document: Document) -> str:
     """A table for each law, the margins of the linear model, and the totals."""
     speeds = [margin["airspeed_mps"] for margin in document["margins"]]
@@ -136,9 +134,6 @@ def as_text(document: Document) -> str:
     head, rows = tabulated(MARGINS, document["margins"])
     linear = aligned([head, *rows])
     return "\n\n".join([*tables, LEGEND, linear, totals])
-
-
-FILES: Makers = {f"{NAME}.json": as_json, f"{NAME}.txt": lambda document: as_text(document) + "\n"}
 
 
 def _cell(row: Document) -> str:
@@ -166,3 +161,4 @@ MARGINS = (
     ("power to attitude", "attitude_zero_rad_s", "zero at +{:.2f} rad/s".format),
     ("its range as elevator", "worth_deg", "{0[0]:+.1f} to {0[1]:+.1f} deg".format),
 )
+FILES: Makers = {f"{NAME}.json": as_json, f"{NAME}.txt": lambda document: as_text(document) + "\n"}

@@ -45,12 +45,12 @@ def test_a_property_that_the_model_lacks_is_said_at_its_line(trainer, old, new, 
 
 
 def test_the_digest_of_an_aircraft_is_of_paths_and_contents_of_any_name(trainer):
-    found = [admission.digest_of(trainer)]
+    found = [admission.digest_of_aircraft(trainer)]
     for name in (b"\xff.xml", b"a.xml", b"b.xml"):
         (trainer / os.fsdecode(name)).write_text("<a/>")
-        found.append(admission.digest_of(trainer))
+        found.append(admission.digest_of_aircraft(trainer))
     (trainer / "b.xml").rename(trainer / "Engines.xml")
-    assert len({*found, admission.digest_of(trainer)}) == 5
+    assert len({*found, admission.digest_of_aircraft(trainer)}) == 5
 
 
 def test_a_model_that_would_write_is_refused_each_time_whatever_the_cache_has(trainer):

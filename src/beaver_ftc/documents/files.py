@@ -249,6 +249,15 @@ def digest_of_files(*files: Path) -> str:
     return digest.hexdigest()[:16]
 
 
+def digest_of_aircraft(folder: Path) -> str:
+    """Digest of the paths, sizes and contents of an aircraft's files, 32 hexadecimal digits."""
+    digest = hashlib.sha256()
+    for path in sorted(p for p in folder.rglob("*") if p.suffix in (".xml", ".yaml") and p.is_file()):
+        content = path.read_bytes()
+        digest.update(b"%b %d " % (os.fsencode(path.relative_to(folder)), len(content)) + content)
+    return digest.hexdigest()[:32]
+
+
 PASSED, FAILED = b"passed", b"failed"
 NO = 3  # the status of a child that has found out that it does not
 PATIENCE_S = 120.0  # on the clock: a busy machine may need that long to begin

@@ -6,7 +6,7 @@ from beaver_ftc.public import lazily
 
 if TYPE_CHECKING:
     from beaver_ftc.plant.adapter import PA_PER_PSF, FlightState, Plant, bare, body_axes, translated
-    from beaver_ftc.plant.admission import digest_of as digest_of_aircraft
+    from beaver_ftc.plant.admission import digest_of_aircraft
     from beaver_ftc.plant.ground import lay as lay_ground
     from beaver_ftc.plant.ground import stand as stand_on_ground
     from beaver_ftc.plant.instrumented import (

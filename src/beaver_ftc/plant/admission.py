@@ -6,8 +6,6 @@ keeps the digest of a folder that has passed: the last two checks are not repeat
 """
 
 import contextlib
-import hashlib
-import os
 from collections.abc import Iterator, Mapping
 from functools import lru_cache
 from importlib.metadata import version
@@ -18,7 +16,7 @@ from beaver_ftc.aircraft.aircraft import FILE
 from beaver_ftc.aircraft.schema import AircraftFile
 from beaver_ftc.documents.document import Location, Problem
 from beaver_ftc.documents.errors import SimulationFailed
-from beaver_ftc.documents.files import cache_base, digest_of_files
+from beaver_ftc.documents.files import cache_base, digest_of_aircraft, digest_of_files
 from beaver_ftc.documents.validation import ScenarioError, parse_document
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.model_file import check_model_has_no_side_effects
@@ -37,7 +35,7 @@ def admit(aircraft: Aircraft) -> None:
     """
     check_model_has_no_side_effects(aircraft.jsbsim)
     base = cache_base()
-    passed = f"{digest_of(aircraft.folder)}-{digest_of_files(*_CHECKS)}-{version('jsbsim')}"
+    passed = f"{digest_of_aircraft(aircraft.folder)}-{digest_of_files(*_CHECKS)}-{version('jsbsim')}"
     kept = None if base is None else base / "admitted" / passed
     if kept is not None and kept.is_file():
         return
@@ -48,15 +46,6 @@ def admit(aircraft: Aircraft) -> None:
         with contextlib.suppress(OSError):  # nowhere to keep it: checked again the next time
             kept.parent.mkdir(parents=True, exist_ok=True)
             kept.touch()
-
-
-def digest_of(folder: Path) -> str:
-    """Digest of the paths, sizes and contents of an aircraft's files, 32 hexadecimal digits."""
-    digest = hashlib.sha256()
-    for path in sorted(p for p in folder.rglob("*") if p.suffix in (".xml", ".yaml") and p.is_file()):
-        content = path.read_bytes()
-        digest.update(b"%b %d " % (os.fsencode(path.relative_to(folder)), len(content)) + content)
-    return digest.hexdigest()[:32]
 
 
 def _check_properties(aircraft: Aircraft) -> None:

@@ -9,11 +9,11 @@ from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.documents import (
     BadInput,
 )
+from beaver_ftc.plant import digest_of_aircraft
 from beaver_ftc.scenario import (
     Scenario,
     Sweep,
 )
-from beaver_ftc.studies.engine import digest_of_aircraft
 from beaver_ftc.studies.sweep import Assignment, Plan, flight_name, scenario_of
 
 

@@ -7,7 +7,7 @@ from beaver_ftc.public import lazily
 if TYPE_CHECKING:
     from beaver_ftc.studies.engine.files import write_whole
     from beaver_ftc.studies.engine.forks import Forks
-    from beaver_ftc.studies.engine.identity import digest_of_aircraft, fingerprint, plug_ins
+    from beaver_ftc.studies.engine.identity import fingerprint, plug_ins
     from beaver_ftc.studies.engine.processes import ONE_THREAD_EACH, cores, single_threaded
     from beaver_ftc.studies.engine.processes import context as process_context
     from beaver_ftc.studies.engine.statistics import poisson

@@ -3,14 +3,12 @@
 A study resumes only with the same identity, so that old and new rows belong into one table.
 """
 
-import hashlib
 import json
-from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.documents.files import data_root, read_json
+from beaver_ftc.documents.files import data_root, digest_of_files, read_json
 from beaver_ftc.plugins import SERVICES, folders
 from beaver_ftc.results.metrics import versions
 from beaver_ftc.results.model import Document
@@ -96,19 +94,4 @@ def hashed_files() -> list[Path]:
 @cache
 def fingerprint() -> str:
     """A digest of `hashed_files`. A version number alone would not change with an edit of the code."""
-    return digest(hashed_files())[:16]
-
-
-def digest_of_aircraft(folder: Path) -> str:
-    """A digest of the XML and YAML files of an aircraft, which distinguishes aircraft with the same name."""
-    return digest(
-        path for path in sorted(folder.rglob("*")) if path.suffix in (".xml", ".yaml") and path.is_file()
-    )
-
-
-def digest(paths: Iterable[Path]) -> str:
-    """A digest of the names and contents of files."""
-    sha256 = hashlib.sha256()
-    for path in paths:
-        sha256.update(path.name.encode() + path.read_bytes())
-    return sha256.hexdigest()
+    return digest_of_files(*hashed_files())

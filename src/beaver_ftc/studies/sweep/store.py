@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, Self
 
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
+from beaver_ftc.documents.files import digest_of_aircraft
 from beaver_ftc.results.folder import clear_disk_errors, refuse_foreign, sync
 from beaver_ftc.results.model import Document
 from beaver_ftc.scenario.sweeps import Sweep
@@ -46,7 +47,7 @@ def identity_of(sweep: Sweep, search: str | None = None) -> Document:
     file = sweep.file.model_dump(mode="json", exclude_none=True)
     of_file = {key: value for key, value in file.items() if key not in _NOT_FLOWN}
     base = {key: value for key, value in sweep.base.items() if key != "description"}
-    aircraft = identity.digest_of_aircraft(sweep.aircraft.folder)
+    aircraft = digest_of_aircraft(sweep.aircraft.folder)
     of_run = {"runs": sweep.flights, "base": base, "aircraft": aircraft, "search": search}
     return identity.of_request("sweep", {**of_file, **of_run})
 

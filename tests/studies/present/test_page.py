@@ -39,12 +39,6 @@ def test_each_content_is_written_in_its_way_and_a_file_may_be_made_of_another(tm
     assert b"beaver-ftc" in (tmp_path / "out/figures/one.png").read_bytes()[:2048]
 
 
-def test_a_figure_is_the_same_to_the_byte_each_time(tmp_path):
-    for folder in ("a", "b"):
-        write_files(tmp_path / folder, {"one.png": drawn()})
-    assert (tmp_path / "a/one.png").read_bytes() == (tmp_path / "b/one.png").read_bytes()
-
-
 def test_the_text_of_a_page_has_no_pictures():
     parts = ["said", Pictures([("one", "one")]), Heading("numbers"), Table(("a", "b"), [("1", "22")]), "note"]
     assert as_text(parts) == "said\n\nnumbers\n\na  b\n1  22\nnote"

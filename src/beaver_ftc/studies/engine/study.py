@@ -155,18 +155,15 @@ def _keeping(study: Study, out: Path) -> Iterator[store.Parts]:
 
 def fly_all(fly: Fly, cases: Sequence[Any], workers: int, progress: Progress | None = None) -> list[Any]:
     """fly(case) of every case, in order. No row is kept in a file."""
-
-    def none_landed(number: Number, runs: Sequence[int]) -> None:
-        """No rows have landed before."""
-
-    def forget(number: Number, rows: Any) -> None:
-        """Rows are not kept."""
-
     make = partial(_workers, Work(fly), workers)
     pieces = store.batches_of(len(cases), 1)
-    with contextlib.closing(Flying(none_landed, forget, make, _fail)) as flying:
+    with contextlib.closing(Flying(_nothing, _nothing, make, _fail)) as flying:
         rows_of_piece = _fly_pieces(flying, dict(pieces), cases, progress)
     return [rows_of_piece[n][0] for n in range(len(cases))]
+
+
+def _nothing(number: Number, runs_or_rows: Any) -> None:
+    """In place of a store: no rows have landed before, and none are kept."""
 
 
 def _workers(work: Work, workers: int, cases: int) -> Workers:

@@ -15,7 +15,6 @@ from beaver_ftc.results.folder import clear_disk_errors
 from beaver_ftc.results.metrics import as_json, versions
 from beaver_ftc.results.model import Document
 from beaver_ftc.scenario.sweeps import Sweep, SweepExpect
-from beaver_ftc.studies.engine.files import write_whole
 from beaver_ftc.studies.engine.flying import Flying
 from beaver_ftc.studies.engine.processes import cores
 from beaver_ftc.studies.engine.store import batches_of
@@ -223,5 +222,5 @@ def replay(sweep: Sweep, options: Options, index: int) -> Document:
     document = run(scenario, folder / "flights", options.report, certified=options.keep.certified)
     if (folder / "report.html").exists():  # written again with a link to the flight
         summary = read_json(folder / "summary.json")
-        write_whole(folder / "report.html", render(summary, folder).encode("utf-8"))
+        Store(folder, sweep).write("report.html", render(summary, folder))
     return document | {"folder": str(folder / "flights" / scenario.name)}

@@ -22,8 +22,8 @@ NO_ROWS = ("cli", "commands", "pytest_plugin")
 def of_request(kind: str, request: Document) -> Document:
     """The identity of a study. kind: `study` or `sweep`, the key of the resolved request. The identity also
     has the versions of the packages of this machine, and the fingerprint of the code."""
-    document = {kind: request, "versions": {**versions(), **plug_ins(), "flight code": fingerprint()}}
-    return json.loads(json.dumps(document))
+    versions_here = {**versions(), **plug_ins(), "flight code": fingerprint()}
+    return json.loads(json.dumps({kind: request, "versions": versions_here}))
 
 
 def read_identity(manifest: Path, kind: str) -> Document | None:

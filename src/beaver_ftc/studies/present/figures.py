@@ -83,7 +83,7 @@ def draw_estimates(
     horizontal axis."""
     rows = [[estimate[key] for key in ("value", "low", "high")] for estimate in estimates]
     value, low, high = times * np.array(rows, dtype=float).reshape(-1, 3).T
-    bars = np.maximum(value - low, 0.0), np.maximum(high - value, 0.0)
+    bars = np.maximum([value - low, high - value], 0.0)
     if across:
         axes.errorbar(value, places, xerr=bars, **look)
     else:

@@ -144,7 +144,7 @@ def _errors(coupling: float, swing_rad_s2: float, draws: np.random.Generator) ->
 def _undeclared(scenario: Scenario, share: float, draws: np.random.Generator) -> Document:
     """An error of every moment coefficient by this share, with a random sign."""
     shares = {term.name: share for term in scenario.airframe.moments}
-    ratios = signed(shares, 1.0, FACTOR_LIMITS, 1.0, draws) if share else {}
+    ratios = signed(shares, usual=1.0, limits=FACTOR_LIMITS, times=1.0, draws=draws) if share else {}
     return {"uncertainty.coefficients": ratios}
 
 

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
 
 Drawer = Callable[[Flights, Document], "Figure | None"]
+Place = tuple[int, ...]  # row and column of a cell
 
 BINS = 16  # most bins of a curve
 LEAST_A_BIN = 10  # flights in a bin, unless the curve has fewer
@@ -178,9 +179,6 @@ def confusion_matrix(flights: Flights, summary: Document) -> "Figure | None":
 
     title = "What broke (rows) against what the diagnosis said (columns)"
     return _shaded(title, shares, text, columns, rows)
-
-
-Place = tuple[int, ...]  # row and column of a cell
 
 
 def _shaded(

@@ -3,7 +3,8 @@ matter.
 
 `explained` is the share of the variance of the ranks of the outcome between groups of flights with similar
 values of the key, corrected for chance (Kruskal and Wallis' epsilon squared). Its p-value is from random
-permutations of the outcome, and adjusted for the number of keys by their maximum [WestfallYoung1993].
+permutations of the outcome. It is adjusted for the number of keys: the share is compared with the largest
+share of all keys in each permutation [WestfallYoung1993].
 """
 
 import numpy as np

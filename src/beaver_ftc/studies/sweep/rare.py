@@ -169,7 +169,8 @@ def rare_study(sweep: Sweep, expectation: str, tell: Callable[[str], None] = lam
     event = Event(sweep, expectation)
     # no cases of its own: `rounds` makes them, and returns the document
     return Study(
-        event.name, (), event.fly, dict, {"rare.json": as_json, "flight.yaml": event.likeliest},
+        event.name, cases=(), fly=event.fly, document=dict,
+        files={"rare.json": as_json, "flight.yaml": event.likeliest},
         follows_from=[identity_of(sweep, expectation), RUNS, MEMBERS], lost=event.lost,
         warm_up=partial(warm_up, sweep), rounds=partial(event.rounds, tell=tell),
     )  # fmt: skip

@@ -86,7 +86,7 @@ def quantiles(values: np.ndarray) -> Document:
     """QUANTILES of the values (n,) without NaN, and their number. An event that never came has an infinite
     value; an infinite quantile is null."""
     ordered = _sorted_without_nan(values)
-    return {"of": int(ordered.size), **{name: number(quantile(ordered, q)) for name, q in QUANTILES.items()}}
+    return {"of": ordered.size, **{name: number(quantile(ordered, q)) for name, q in QUANTILES.items()}}
 
 
 def _sorted_without_nan(values: np.ndarray) -> np.ndarray:

@@ -42,13 +42,14 @@ def remove_leftovers(folder: Path) -> None:
 
 
 def empty(folder: Path) -> None:
-    """Remove the content of a locked folder, as far as possible, without the lock: it holds until this is
-    done."""
-    for path in folder.iterdir():
-        if path.is_dir():
-            shutil.rmtree(path, ignore_errors=True)
-        elif path.name != LOCK:
-            path.unlink(missing_ok=True)
+    """Remove the content of a locked folder, as far as possible, but not its lock, which must hold until the
+    rest is removed."""
+    with contextlib.suppress(OSError):
+        for path in folder.iterdir():
+            if path.is_dir():
+                shutil.rmtree(path, ignore_errors=True)
+            elif path.name != LOCK:
+                path.unlink()
 
 
 @contextlib.contextmanager

@@ -24,8 +24,10 @@ Stamps = NDArray[np.int64]
 Names = dict[str, dict[str, str]]
 """By part (`rates`, `commands`, ...) and name of a signal, its name in the recording."""
 RECORDING_FILE_OF_KIND = {"table": "flight.csv", "ulog": "flight.ulg", "ardupilot": "flight.bin"}
+_MOST_FIELDS = 15  # fields of a dataflash message beside its stamp: its layout has 16 bytes
 # By kind and part, the pattern of the names: `topic.field`, or the column of a table. In a pattern, i counts
-# the signals of the part from 0 on, and n from 1 on.
+# the signals of the part from 0 on. The commands of _MOST_FIELDS surfaces are in the dataflash message SRFC,
+# those of further ones in SRFD; n counts the fields of each message from 1 on.
 _NAMES_OF_KIND = {
     "table": {
         "rates": "{name}_rad_s", "commands": "{name}_command", "attitude": "{name}_rad",
@@ -36,7 +38,7 @@ _NAMES_OF_KIND = {
         "airspeed": "airspeed.true_airspeed_m_s", "attitude": "attitude.{name}_rad", "flow": "flow.{name}",
     },
     "ardupilot": {
-        "rates": "IMU.Gyr{axis}", "commands": "SRFC.C{n}", "airspeed": "ARSP.Airspeed",
+        "rates": "IMU.Gyr{axis}", "commands": "SRF{letter}.C{n}", "airspeed": "ARSP.Airspeed",
         "attitude": "ATT.{title}", "flow": "FL{i}.V",
     },
 }  # fmt: skip
@@ -86,7 +88,10 @@ def write_recording(
     for part, pattern in _NAMES_OF_KIND[kind].items():
         names[part] = {}
         for i, (name, column) in enumerate(source_of[part].items()):
-            recorded = pattern.format(name=name, title=name.title(), i=i, n=i + 1, axis="XYZ"[i % 3])
+            recorded = pattern.format(
+                name=name, title=name.title(), axis="XYZ"[i % 3], i=i, n=i % _MOST_FIELDS + 1,
+                letter="CD"[i // _MOST_FIELDS],
+            )  # fmt: skip
             names[part][name] = recorded
             values = series[column]
             if part == "commands":

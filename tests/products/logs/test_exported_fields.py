@@ -18,13 +18,13 @@ from beaver_ftc_logs.readers import read_flight
 from results.synthetic import landed
 
 RATE_HZ, FRAMES = 24.0, 60  # of whose microseconds a third is cut or rounded
-TRAVEL_RAD = {"aileron": 0.5, "elevator": 0.4, "rudder": 0.3, "flap": 1.0}
+# As many surfaces as the imported GTM has, more than the fields of one dataflash message.
+TRAVEL_RAD = {"flap": 1.0, **{f"surface_{i}": 0.3 + 0.1 * i for i in range(16)}}
 DEG = 180.0 / math.pi
 COLUMNS = (
     "north_m", "east_m", "altitude_m", "phi_rad", "theta_rad", "psi_rad", "airspeed_mps", "alpha_rad",
-    "beta_rad", "p_measured_rad_s", "q_measured_rad_s", "r_measured_rad_s", "aileron_cmd_rad",
-    "elevator_cmd_rad", "rudder_cmd_rad", "flap_cmd_rad", "aileron_pos_rad", "elevator_pos_rad",
-    "rudder_pos_rad", "flap_pos_rad", "qdyn_pa", "dpt",
+    "beta_rad", "p_measured_rad_s", "q_measured_rad_s", "r_measured_rad_s", "flap_pos_rad", "qdyn_pa", "dpt",
+    *(f"{name}_cmd_rad" for name in TRAVEL_RAD),
 )  # fmt: skip
 
 
@@ -101,7 +101,7 @@ RECORDED = {
     },
     "ardupilot": {
         **{f"IMU.Gyr{x}": rate for x, rate in zip("XYZ", _RATES, strict=True)},
-        **{f"SRFC.C{i + 1}": share for i, share in enumerate(_SHARES.values())},
+        **{f"SRF{'CD'[i // 15]}.C{i % 15 + 1}": share for i, share in enumerate(_SHARES.values())},
         "ARSP.Airspeed": ("airspeed_mps", 1.0),
         **{f"ATT.{angle.title()}": (column, DEG) for angle, column in _ANGLES.items()},
         **{f"FL{i}.V": (name, 1.0) for i, name in enumerate(_FLOW)},

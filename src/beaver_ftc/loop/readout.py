@@ -68,6 +68,11 @@ class FrameReadout:
         return float(self._frame["measured"]["y"][0])
 
     @cached_property
+    def missing_sensors(self) -> np.ndarray:
+        """Numbers of the sensors without a reading in this frame."""
+        return np.flatnonzero(self._frame["measured"]["missing"])
+
+    @cached_property
     def expected_u_rad(self) -> np.ndarray:
         """Positions that the actuators' model gives, (surfaces,) rad."""
         return np.array(self._frame["prediction"]["u"])

@@ -3,6 +3,7 @@ of a finished flight, which is flown again.
 """
 
 from collections.abc import Iterable
+from math import nan
 
 import numpy as np
 
@@ -40,8 +41,8 @@ def proof(scenario: Scenario, log: Log) -> Proof:
 
 
 def _log(frames: np.ndarray, flown: Iterable[int], scenario: Scenario, recorder: Recorder) -> MemoryLog:
-    """A log of all frames, with the columns that a certificate needs, except `watch_missing`. Advances the
-    frames and records them. further: column -> value of the last frame."""
+    """A log of all frames, with the columns that a certificate needs. Advances the frames and records them.
+    further: column -> value of the last frame."""
     log = MemoryLog()
     surfaces = scenario.airframe.surfaces
     names = estimator_names(scenario.fdi.fault_class, scenario.airframe)
@@ -56,9 +57,10 @@ def _log(frames: np.ndarray, flown: Iterable[int], scenario: Scenario, recorder:
         vectors = frame.rates_rad_s, frame.model_rad_s2, diagnosis.declared_bounds.eta_bar_rad_s2
         if scenario.fdi.statistical:
             further = chance.likelihood_shares(diagnosis, surfaces)
-        if diagnosis.sensor_monitor.enabled:
-            monitor = diagnosis.sensor_monitor
+        monitor = diagnosis.sensor_monitor
+        if monitor.enabled:
             further |= {"watch_share": monitor.top_ratio, "watch_test": monitor.worst_test_index}
+            further["watch_missing"] = next(iter(frame.missing_sensors), nan)
         # The order of the columns.
         numbers = [frame.alarmed, *diagnosis.is_estimator_excluded, *further.values()]
         rows.append(np.concatenate([[k / scenario.rate_hz], *vectors, numbers]))

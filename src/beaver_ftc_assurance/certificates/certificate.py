@@ -50,12 +50,7 @@ from beaver_ftc_assurance.certificates.inequality import (
     no_fault,
     single_frame_tests,
 )
-from beaver_ftc_assurance.certificates.tape import (
-    MAX_FRAMES_AFTER_ALARM,
-    Recorder,
-    Tape,
-    tape_of_flight_again,
-)
+from beaver_ftc_assurance.certificates.tape import Recorder, Tape, tape_of_flight_again
 
 Columns = dict[str, np.ndarray]
 # Ends of the names of columns by axis.
@@ -63,7 +58,6 @@ MEASURED_MODEL_BOUND = "measured_rad_s", "design_rad_s2", "eta_bar_rad_s2"
 _LOGGED_COLUMNS = {"watch_missing"} | {f"{axis}_{end}" for axis in AXES for end in MEASURED_MODEL_BOUND}
 _EVENT_COLUMN = re.compile("detected|fie_.*_excluded")  # columns of the alarm and of exclusions
 _SHARE_SUFFIX = "_likelihood_share"  # end of the name of a column with a share of the alarm level
-TOO_LATE = f"more than {MAX_FRAMES_AFTER_ALARM} frames after the alarm, or with another diagnosis restarted"
 ADDING_POLE_PER_S = 0.1  # so slow that the filter is nearly the sum over a block
 
 
@@ -97,7 +91,7 @@ def certificate(
     flight = _Flight(scenario, rows, tape, history_of(scenario, rows, tape))
     for statement in flight.statements(events):
         if "because" in statement:  # not certified: without a row, since nothing can prove it
-            del statement["frame"]
+            statement.pop("frame", None)
         document["without" if "because" in statement else "statements"].append(statement)
     if document["statements"]:
         document |= flight.declared_fields(document["statements"])
@@ -192,7 +186,7 @@ class _Flight:
             if column not in events:
                 continue
             k = events[column]
-            evidence: Document = {"because": TOO_LATE}
+            evidence: Document = {"because": kinds.TOO_LATE}
             if k < tape.end:
                 evidence = self._exclusion(e, alarm, k) or chance.exclusion_by_alarm(tape, e, of_alarm)
             yield {"what": name, "column": column, "frame": k} | evidence
@@ -289,16 +283,21 @@ class _Flight:
                     yield [Term(d, pole, tape.since, k, effect_before=float(reach[e, m, i]))]
 
     def _types(self, alarm: int) -> Iterator[Document]:
-        """A statement for each type that is excluded at the end of the tape, surface by surface. Its column
-        is one of `evidence_columns`. If types are tested by blocks of frames, tape, history and alarm are
-        those by blocks; without a complete block, no type is certified."""
+        """A statement for each type that is excluded at the end of the flight, surface by surface. Its column
+        is one of `evidence_columns`; a type that was excluded after the tape has none. If types are tested by
+        blocks of frames, tape, history and alarm are those by blocks; without a complete block, no type is
+        certified."""
         tape = self.tape
         history = self.history
         if tape.alarm.diagnosis.types_config.frames_per_block > 1:
             tape, history, alarm = in_blocks(tape, history, alarm)
         any_block = len(tape.types) > 0
-        for s, kind, k in kinds.excluded_types(tape if any_block else self.tape):
+        with_flags = tape if any_block else self.tape
+        for s, kind, k in kinds.excluded_types(with_flags):
             surface = self.scenario.airframe.surfaces[s]
+            if k == with_flags.end:
+                yield {"what": kinds.exclusion_name(surface, kind), "because": kinds.TYPE_TOO_LATE}
+                continue
             row = self.tape.first + row_set_to_end(self.tape.types[:, s, kind])
             because = kinds.reason_not_certified(tape, kind) if any_block else kinds.EXCLUDED_BY_MANY_FRAMES
             evidence = None if because else self._type(tape, history, s, kind, alarm, k)

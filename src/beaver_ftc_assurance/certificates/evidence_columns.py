@@ -13,8 +13,8 @@ from beaver_ftc_assurance.certificates.tape import Tape
 
 def evidence_columns(tape: Tape, surfaces: Sequence[str], statements: Sequence[Document]) -> EvidenceColumns:
     """The columns for these statements. For the fault of an estimator: its effect. For a fault type on a
-    surface: the effect of the surface's position, the travel, the flags of the excluded types, and the
-    definitions of types that the checker does not define.
+    surface: the effect of the surface's position, the travel, the flags of the types that are excluded at the
+    end of the tape, and the definitions of types that the checker does not define.
     """
     columns: EvidenceColumns = {}
     # `what` of a statement is None for the alarm, the name of an estimator, or a surface and a type in words.
@@ -32,8 +32,8 @@ def evidence_columns(tape: Tape, surfaces: Sequence[str], statements: Sequence[D
     for surface in dict.fromkeys(surfaces_of_types):
         low, high = kinds.travel_rad(tape, surfaces.index(surface))
         columns |= _constants({f"{surface}_travel_low_rad": low, f"{surface}_travel_high_rad": high})
-    for s, kind, _ in kinds.excluded_types(tape):
-        if surfaces[s] in surfaces_of_types:
+    for s, kind, first in kinds.excluded_types(tape):
+        if surfaces[s] in surfaces_of_types and first < tape.end:
             flags = np.append(0.0, tape.types[:, s, kind] > 0)
             columns[kinds.exclusion_column(surfaces[s], kind)] = PartialColumn(tape.first - 1, flags)
             columns |= _constants(kinds.type_definition_columns(tape, surfaces[s], s, kind))

@@ -24,24 +24,32 @@ from beaver_ftc_assurance.certificates.inequality import (
     constant_theta_tests,
     single_frame_tests,
 )
-from beaver_ftc_assurance.certificates.tape import Tape
+from beaver_ftc_assurance.certificates.tape import KEPT_AFTER_EVENT_S, MAX_FRAMES_AFTER_ALARM, Tape
 
 EXCLUDED_BY_MANY_FRAMES = "frames of quiet excluded it, or what several say together"
 OSCILLATION_AT_STOP = "of several instants a frame, a swing that a stop cuts off may keep its sign"
+TOO_LATE = f"more than {MAX_FRAMES_AFTER_ALARM} frames after the alarm, or with another diagnosis restarted"
+TYPE_TOO_LATE = (
+    f"more than {KEPT_AFTER_EVENT_S:g} s after the alarm and all exclusions of surfaces, or {TOO_LATE}"
+)
 UNKNOWN_TYPE = "no certificate is known for this type"
 RETURNING_SURFACE = "its actuator may be bringing the surface back"
 STUCK = type_index_of("stuck")
 
 
 def excluded_types(tape: Tape) -> Iterator[tuple[int, int, int]]:
-    """(surface, type, first frame of the tape with the flag) of each type that is excluded at the end of the
-    tape, on surfaces whose position estimator is not excluded there."""
+    """(surface, type, first frame with the flag) of each type that is excluded at the end of the tape or of
+    the flight, on surfaces whose position estimator is not excluded at the same end, nor at that of the tape.
+    The frame is `tape.end` if the type was excluded after the tape."""
     layout = tape.alarm.diagnosis.layout
-    for s, kinds in enumerate(tape.types[-1]):
-        if tape.excluded[-1][layout.position_estimator_index_by_surface[s]]:
+    remaining = np.flatnonzero(~tape.last.diagnosis.is_estimator_excluded)
+    for s, surface in enumerate(tape.last.diagnosis.surface_fault_types):
+        e = layout.position_estimator_index_by_surface[s]
+        if tape.excluded[-1][e]:
             continue
-        for kind in np.flatnonzero(kinds):
-            yield s, int(kind), tape.first + int(np.argmax(tape.types[:, s, kind] > 0))
+        flags = np.vstack([tape.types[:, s] > 0, surface.is_type_excluded & (e in remaining)])
+        for kind in np.flatnonzero(flags[-2:].any(axis=0)):
+            yield s, int(kind), tape.first + int(np.argmax(flags[:, kind]))
 
 
 def reason_not_certified(tape: Tape, kind: int) -> str | None:

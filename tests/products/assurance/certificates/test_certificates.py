@@ -20,7 +20,7 @@ from tools.drawn.certificates import altered, places
 import beaver_ftc as bf
 from beaver_ftc.cli.main import main
 from beaver_ftc.diagnosis.types.registry import DESCRIPTIONS_IN_TYPE_ORDER, N_TYPES, TYPES
-from beaver_ftc_assurance.certificates import check_certificate
+from beaver_ftc_assurance.certificates import check_certificate, tape
 from beaver_ftc_assurance.certificates.certified import as_text, with_digest
 from beaver_ftc_assurance.certificates.check_certificate import Refused, check_statement_form, failures
 from beaver_ftc_assurance.separation import certified
@@ -165,6 +165,14 @@ def test_the_alarm_of_a_flight_with_a_doublet_is_proved_as_without_it():
     held = {"duration_s": 0.0, "time_s": 0.0, "commands_rad": {}}
     with_doublet = certified(bf.load(yaml.safe_load(scenario)), held)
     assert with_doublet.document["statements"] == certificate["statements"]
+
+
+def test_a_type_that_is_excluded_after_the_tape_has_no_statement(monkeypatch):
+    monkeypatch.setattr(tape, "KEPT_AFTER_EVENT_S", 0.05)
+    certificate, *proof = proved.__wrapped__("any type")
+    assert [*failures(certificate, *proof)] == []
+    late = {said["what"] for said in certificate["without"]}
+    assert late == {"aileron rate_limit", "aileron bias that grows"}
 
 
 def check(*arguments):

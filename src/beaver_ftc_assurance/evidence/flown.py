@@ -79,7 +79,7 @@ def failed(plan: EvidencePlan, case: tuple[str, int], why: str, status: str = CR
     source = plan.sources[name]
     none = part("flight", None, None, NOT_SHOWN, says=why)
     assigned = source.assignment(run)
-    of_sweep = assigned and row_of_failure(source.content, assigned, status, why)  # type: ignore[arg-type]
+    of_sweep = assigned and row_of_failure(source.content, assigned, status, why)
     return {
         "flight": source.flight(run), "source": name, "run": run, "status": status, "why": why,
         "found": {requirement.id: [none] for requirement in plan.of(name)}, "row": of_sweep,

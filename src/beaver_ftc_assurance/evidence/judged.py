@@ -19,7 +19,7 @@ import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.results import Document, versions
-from beaver_ftc.scenario import Sweep, SweepExpect
+from beaver_ftc.scenario import SweepExpect
 from beaver_ftc.scenario.faults import DAMAGE, TYPES, UNANTICIPATED
 from beaver_ftc.studies.engine import fingerprint, plug_ins
 from beaver_ftc.studies.sweep import RESULTS, Flights
@@ -149,7 +149,6 @@ def _of_sweep(plan: EvidencePlan, bar: OfSweep, name: str, rows: Sequence[Row]) 
 
     source = plan.sources[name]
     sweep = source.content
-    assert isinstance(sweep, Sweep)
     schema = schema_of(sweep)
     table = table_of(sweep, schema, [row["row"] for row in rows if row["source"] == name])
     file = io.BytesIO()  # `Flights` reads the file of a sweep, whose columns differ from those of the rows

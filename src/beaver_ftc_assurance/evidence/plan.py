@@ -27,7 +27,6 @@ from beaver_ftc.results import Formula, FormulaError, parse_formula
 from beaver_ftc.scenario import (
     Expect,
     Scenario,
-    Sweep,
     builtin_names,
     builtin_sweeps,
     checked_against,
@@ -43,7 +42,7 @@ from beaver_ftc.scenario import (
     validate_sweep,
 )
 from beaver_ftc_assurance.evidence.plan_file import OfSweep, PlanFile, Requirement
-from beaver_ftc_assurance.evidence.source import Source
+from beaver_ftc_assurance.evidence.source import Source, SweepSource
 
 MOST_FLIGHTS = 100_000  # largest number of flights of a plan
 
@@ -122,7 +121,7 @@ class _Reading:
             if formula:
                 formulas[requirement.id] = formula
             for k, source in enumerate(sources):
-                if isinstance(requirement.bar, OfSweep) and not isinstance(source.content, Sweep):
+                if isinstance(requirement.bar, OfSweep) and not source.is_sweep:
                     text = f"{source.given} is a scenario, allowed with a bar of type sweep: sweeps"
                     self._problem((*place, "over", k), text)
                 if formula:
@@ -189,11 +188,10 @@ class _Reading:
         none."""
         if given in self._file.flights:
             return self._own(given)
-        if given in builtin_names() or given in builtin_sweeps():
-            built_in: Scenario | Sweep = (
-                load_sweep(given) if given in builtin_sweeps() else load_scenario(given)
-            )
-            return Source(built_in.name, given, built_in)
+        if given in builtin_sweeps():
+            return SweepSource(given, load_sweep(given))
+        if given in builtin_names():
+            return Source(given, load_scenario(given))
         path = inside(self._path.parent, given)
         if path is None:
             text = f"{given[:100]!r} is outside, allowed: a file in the plan's own folder or below it"
@@ -203,8 +201,9 @@ class _Reading:
         else:
             with contextlib.suppress(OSError):
                 if path.is_file():
-                    loaded = load_sweep(path) if is_sweep(path) else load_scenario(path)
-                    return Source(loaded.name, given, loaded)
+                    if is_sweep(path):
+                        return SweepSource(given, load_sweep(path))
+                    return Source(given, load_scenario(path))
             text = f"no such file: {given[:100]!r}, allowed: a scenario or sweep file"
         raise ScenarioError(str(self._path), [Problem(self._document.line(at), at, text)])
 
@@ -212,12 +211,12 @@ class _Reading:
         """The source of a scenario or sweep in the plan itself."""
         content = self._document.below("flights", name)
         content.data = {"name": name, **content.data}
-        validate = validate_sweep if is_of_a_sweep(content.data) else validate_scenario
         try:
-            source = validate(content, str(self._path), self._path.parent)
+            if is_of_a_sweep(content.data):
+                return SweepSource(name, validate_sweep(content, str(self._path), self._path.parent))
+            return Source(name, validate_scenario(content, str(self._path), self._path.parent))
         except ScenarioError as error:
             raise error.below(str(self._path), "flights", name) from None
-        return Source(source.name, name, source)
 
     def _formula(self, requirement: Requirement, at: Location) -> Formula | None:
         """The formula of a requirement; None if it has none, or one with a mistake, which is added."""

@@ -133,7 +133,7 @@ def distinguish(fault_a: Candidate, fault_b: Candidate, at: Situation, names: Se
     targets: dict[int, float] = {}
     needs: Document = {}
     if fault_a.surface == fault_b.surface and at.in_blocks:
-        return _none("with noisy gyros types are told by blocks of frames, not by one", needs)
+        return _none("with noisy gyros, blocks of frames distinguish types, not single frames", needs)
     if fault_a.surface == fault_b.surface:
         requirements = [(fault_a.surface, *_target_of_types(fault_a, fault_b, at))]
     else:
@@ -179,12 +179,16 @@ def _target_of_types(fault_a: Candidate, fault_b: Candidate, at: Situation) -> t
         (2.0 * MARGIN * B / abs(g) for B, g in zip(at.bound, at.G[:, s], strict=True) if g), default=inf
     )
     u = _deflections(at, s)
-    (low, high) = fault_a.deflection(u)
-    (low_b, high_b) = fault_b.deflection(u)
+    low, high = fault_a.deflection(u)
+    low_b, high_b = fault_b.deflection(u)
     gap = np.maximum(low - high_b, low_b - high)
     # Health must not explain the frame.
     gap = np.minimum(gap, np.minimum(fault_a.off(u), fault_b.off(u)))
-    return _nearest_target(u, gap, s, at, room, "apart, and off their command,")
+    return _nearest_target(
+        u, gap, s, at, room,
+        "the positions must differ from each other and from the command by more than {room:.3g} deg; within "
+        "the travel, they differ by {largest:.3g} deg at most",
+    )  # fmt: skip
 
 
 def _target_of_surface(
@@ -201,7 +205,11 @@ def _target_of_surface(
         (2.0 * MARGIN * np.abs(d) @ at.bound / abs(d @ at.G[:, a]) for d in _blind_to(b, at, a)), default=inf
     )
     u = _deflections(at, a)
-    return _nearest_target(u, fault_a.off(u), a, at, room, "off its command")
+    return _nearest_target(
+        u, fault_a.off(u), a, at, room,
+        "the surface must differ from its command by more than {room:.3g} deg; within the travel, it differs "
+        "by {largest:.3g} deg at most",
+    )  # fmt: skip
 
 
 def _deflections(at: Situation, s: int) -> np.ndarray:
@@ -219,18 +227,17 @@ def _blind_to(b: int, at: Situation, a: int) -> Iterator[np.ndarray]:
 
 
 def _nearest_target(
-    u: np.ndarray, difference: np.ndarray, s: int, at: Situation, room: float, words: str
+    u: np.ndarray, difference: np.ndarray, s: int, at: Situation, room: float, too_small: str
 ) -> tuple[float | None, Document]:
     """The deflection of u (n,) nearest to the present one with difference > room, None if there is none; and
-    the numbers that decide it. difference (n,), rad: at each of u; words: what the deflections must be by
-    more than room, for the message. room, rad: infinite if no direction shows the fault."""
+    the numbers that decide it. difference (n,), rad: at each of u. room, rad: infinite if no direction shows
+    the fault. too_small: the reason if room is finite, with the places {room} and {largest} (difference)."""
     largest_deg = degrees(difference.max())
     is_enough = difference > room
     numbers: Document = {"at_least_deg": degrees(room) if room < inf else None}
     numbers |= {"at_most_deg": largest_deg, "now_deg": degrees(at.u[s])}
     if not is_enough.any():
-        needed = f"more than {degrees(room):.3g} deg" if room < inf else "another direction"
-        text = f"they must be {words} by {needed}, and are by {largest_deg:.3g} deg at most within the travel"
-        return None, numbers | {"because": text}
+        text = too_small.format(room=degrees(room), largest=largest_deg)
+        return None, numbers | {"because": text if room < inf else "no direction shows the fault"}
     target = float(u[is_enough][np.argmin(np.abs(u[is_enough] - at.u[s]))])
     return target, numbers | {"target_deg": degrees(target)}

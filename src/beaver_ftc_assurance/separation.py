@@ -212,18 +212,21 @@ def as_text(document: Document) -> str:
     """The text for a terminal, with a line for each pair."""
     lines = [f"{document['scenario']}, {document['time_s']:g} s: if {document['assumes']}"]
     for pair in document["pairs"]:
-        first, second = (f"{words['surface']} {words['type']}" for words in pair["candidates"])
         if pair["separates"]:
             surfaces = " and ".join(pair["commands_rad"])
             amplitude_deg = pair["amplitude_deg"]
-            moves = f"by {amplitude_deg:.3g} deg" if amplitude_deg > HELD_DEG else "held as now"
-            text = f"{surfaces} {moves}, told after {pair['time_s']:.3g} s"
+            moves = f"by {amplitude_deg:.3g} deg" if amplitude_deg > HELD_DEG else "held in place"
+            text = f"{surfaces} {moves}, distinguished after {pair['time_s']:.3g} s"
             if "left" in pair:
-                remaining = " and ".join(f"{words['surface']} {words['type']}" for words in pair["left"])
-                text += f"; flown, left: {remaining or 'neither'}"
+                text += f"; flown, left: {' and '.join(_names(pair['left'])) or 'neither'}"
         else:
             text = f"none: {pair['because']}"
-        lines.append(f"  {first} or {second}: {text}")
+        lines.append(f"  {' or '.join(_names(pair['candidates']))}: {text}")
     if document["not_constant"]:
-        lines.append(f"  a course over many frames tells: {', '.join(document['not_constant'])}")
+        lines.append(f"  only a course over many frames distinguishes: {', '.join(document['not_constant'])}")
     return "\n".join(lines)
+
+
+def _names(candidates: Sequence[Document]) -> list[str]:
+    """Surface and type of candidates of the document, in words."""
+    return [f"{words['surface']} {words['type']}" for words in candidates]

@@ -78,13 +78,13 @@ def test_it_takes_what_the_two_intervals_ask_for():
 def test_surfaces_that_act_along_one_direction_cannot_be_told_apart_by_a_frame():
     pair = distinguish(Candidate(1, STUCK, 0.1, 0.11), Candidate(3, STUCK, 0.2, 0.22), PLAIN, NAMES)
     assert not pair["separates"]
-    assert "another direction" in pair["because"]
+    assert "no direction shows the fault" in pair["because"]
 
 
 def test_a_surface_without_effect_shows_no_type():
     none = replace(PLAIN, G=np.zeros((3, 4)))
     pair = distinguish(Candidate(1, STUCK, 0.1, 0.11), Candidate(1, FLOAT, 0.0, 0.0), none, NAMES)
-    assert "another direction" in pair["because"]
+    assert "no direction shows the fault" in pair["because"]
     assert pair["needs"]["elevator"]["at_least_deg"] is None
 
 
@@ -139,7 +139,7 @@ def test_where_a_surface_already_tells_it_is_held():
     kinds = [{"surface": "elevator", "type": kind} for kind in ("stuck", "bias")]
     document = {"scenario": "mine", "time_s": 1.0, "assumes": "it stays", "not_constant": []}
     text = as_text(document | {"pairs": [found | {"candidates": kinds}]})
-    assert "elevator stuck or elevator bias: elevator held as now, told after 0.03 s" in text
+    assert "elevator stuck or elevator bias: elevator held in place, distinguished after 0.03 s" in text
 
 
 def test_a_slow_actuator_has_all_of_the_half_second():

@@ -7,7 +7,7 @@ from synthetic import landed
 
 import beaver_ftc as bf
 from beaver_ftc.documents.errors import SimulationFailed
-from beaver_ftc.results import writer
+from beaver_ftc.results import result_files
 from beaver_ftc.results.flight import Flight as Opened
 from beaver_ftc.results.folder import refuse_foreign, result_folder
 from beaver_ftc.results.metrics import metrics
@@ -69,7 +69,7 @@ def own(tmp_path_factory):
 
 def test_an_own_aircraft_is_kept_with_its_flight(own, tmp_path):
     for _ in range(2):  # also where it lies already
-        writer.write_documents(tmp_path, own, metrics(landed()))
+        result_files.write_documents(tmp_path, own, metrics(landed()))
     files = {str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*") if path.is_file()}
     model = {
         str(path.relative_to(own.airframe.folder.parent))

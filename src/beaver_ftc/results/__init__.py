@@ -13,12 +13,12 @@ if TYPE_CHECKING:
     from beaver_ftc.results.metrics import Onset, as_json, faults_of, measure, versions
     from beaver_ftc.results.model import DeclaredFault, Document, Expectation, Judged, Metrics, read_metrics
     from beaver_ftc.results.model import Link as LinkMetrics
+    from beaver_ftc.results.result_files import add_report
     from beaver_ftc.results.simulation import Simulation
     from beaver_ftc.results.style import SERIES as SERIES_COLOURS
     from beaver_ftc.results.temporal import Formula, FormulaError
     from beaver_ftc.results.temporal import parse as parse_formula
     from beaver_ftc.results.verdict import verdict_text
-    from beaver_ftc.results.writer import add_report
     from beaver_ftc.results.writer import run as run_scenario
 else:
     __getattr__, __dir__ = lazily(__name__)

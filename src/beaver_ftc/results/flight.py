@@ -188,7 +188,7 @@ class Flight:
         SimulationFailed if the folder cannot be written.
         """
         from beaver_ftc.results.folder import result_folder
-        from beaver_ftc.results.writer import write_documents, write_report_files
+        from beaver_ftc.results.result_files import write_documents, write_report_files
 
         log = self._log_or_raise()
         with result_folder(Path(out), self.name) as folder:

@@ -25,7 +25,7 @@ from beaver_ftc.results.folder import result_folder
 from beaver_ftc.results.log import ParquetLog, StoredLog
 from beaver_ftc.results.metrics import as_json, measure
 from beaver_ftc.results.model import Document, Metrics
-from beaver_ftc.results.writer import write_documents, write_report_files
+from beaver_ftc.results.result_files import write_documents, write_report_files
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.engine.study import Progress, Study
 from beaver_ftc.studies.mismatch import charts

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from beaver_ftc.results.metrics import hints
+from beaver_ftc.results.hints import hints
 from beaver_ftc.results.model import Metrics
 from beaver_ftc.scenario.schema import Scenario
 

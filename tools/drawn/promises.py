@@ -1,7 +1,7 @@
 """The promises that every flight must keep, and those that a flight breaks.
 
 `broken` reads the metrics alone; `flown_again` flies the scenario again from its text. The module
-`beaver_ftc.results.metrics` decides whether an alarm is false, a detection late or a name right.
+`beaver_ftc.results.judgement` decides whether an alarm is false, a detection late or a name right.
 """
 
 import json
@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 import beaver_ftc as bf
-from beaver_ftc.results.metrics import Truth, is_late
+from beaver_ftc.results.judgement import Truth, is_late
 from beaver_ftc.results.model import DeclaredFault
 from beaver_ftc.scenario.builtin import to_yaml
 from beaver_ftc.scenario.faults import UNANTICIPATED

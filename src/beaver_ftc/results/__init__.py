@@ -9,8 +9,9 @@ if TYPE_CHECKING:
     from beaver_ftc.results.expectations import margin as margin_of_expectation
     from beaver_ftc.results.flight import Flight, Proof
     from beaver_ftc.results.folder import clear_disk_errors, result_folder
+    from beaver_ftc.results.judgement import Onset
     from beaver_ftc.results.log import Columns, Log, MemoryLog, ParquetLog, SpooledLog, StoredLog
-    from beaver_ftc.results.metrics import Onset, as_json, faults_of, measure, versions
+    from beaver_ftc.results.metrics import as_json, faults_of, measure, versions
     from beaver_ftc.results.model import DeclaredFault, Document, Expectation, Judged, Metrics, read_metrics
     from beaver_ftc.results.model import Link as LinkMetrics
     from beaver_ftc.results.result_files import add_report

@@ -101,7 +101,7 @@ def draw(
     view: View, series: Values, event_marks: Sequence[Mark], subtitle: str, style: str = "screen"
 ) -> "Figure":
     """One view as a matplotlib figure, over the time that `series` covers. style: one of STYLES."""
-    figure, grid = _empty_figure_and_axes(view, figure_class())
+    figure, grid = _empty_figure_and_axes(view)
     all_axes = list(grid.flat)
     for axes, panel in zip(all_axes, view.panels, strict=False):
         _draw_panel(axes, panel, series, event_marks)
@@ -157,7 +157,7 @@ def figure_class() -> "type[Figure]":
     return NotebookFigure
 
 
-def _empty_figure_and_axes(view: View, new_figure: Any) -> tuple["Figure", Any]:
+def _empty_figure_and_axes(view: View) -> tuple["Figure", Any]:
     """An empty figure with its grid of axes (rows, columns). The layout is computed here, in inches: the
     layout engine of matplotlib would double the time.
 
@@ -172,7 +172,7 @@ def _empty_figure_and_axes(view: View, new_figure: Any) -> tuple["Figure", Any]:
     ]
     width = 10.0 if is_single else 12.0
     height = TOP + BOTTOM + sum(heights) + GAP * (down - 1)
-    figure = new_figure(figsize=(width, height), dpi=DPI)
+    figure = figure_class()(figsize=(width, height), dpi=DPI)
     left_margin = STEPS_LEFT if view.panels[0].steps else LEFT
     grid = figure.subplots(
         down, view.n_panel_columns, sharex=True, squeeze=False, height_ratios=heights,

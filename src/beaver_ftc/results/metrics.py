@@ -1,191 +1,32 @@
 """The metrics of a flight: the document metrics.json, with the expectations of the scenario (`expect:`).
 
-This module alone decides whether an alarm is false, how late it is, and whether a name is correct:
-
-    term         meaning
-    in force     a fault is in force from the first frame whose time is not before `at_s`, until it ends
-    false        an alarm before the first fault is in force
-    delay, s     time from the first frame with the fault to an event
-    premature    a name that is given before its fault began; such a name is never correct
-
 Times are in s from the start of the flight, rates in deg/s. A quantity that does not exist is null: a
 document never holds NaN. Nothing in the document depends on the wall clock or on the name of the machine, so
 that the same scenario and seed give the same file.
 
-The fields of `results/model.py` explain the keys. This module has three parts: the judgement of events
-(`Onset`, `Truth`), the sections of the document (`measure`), and the hints (`hints`).
+The fields of `results/model.py` explain the keys; `judgement.py` decides whether alarms and names are right.
 """
 
 import json
 import math
 import platform
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import replace
 from functools import cache
 from importlib.metadata import version
-from math import inf
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 from beaver_ftc.results import model
 from beaver_ftc.results.expectations import evaluate
+from beaver_ftc.results.hints import hints
+from beaver_ftc.results.judgement import TIME_DECIMALS, Onset, Truth
 from beaver_ftc.results.model import DeclaredFault, Document, Metrics, Quantity, rounded
-from beaver_ftc.scenario.diagnosis import failing, of_several
-from beaver_ftc.scenario.faults import UNANTICIPATED, Damage, acting_at, is_share, size_at
-from beaver_ftc.scenario.signals import TIME_TOLERANCE_S, first_frame_s, is_before, is_in_force
-from beaver_ftc.scenario.undeclared import declares_all
+from beaver_ftc.scenario.faults import acting_at, is_share, size_at
 from beaver_ftc.scenario.warnings import outside_class
 
 if TYPE_CHECKING:
     from beaver_ftc.loop.outcome import Landing
     from beaver_ftc.scenario.schema import Scenario
-
-
-_TIME_DECIMALS = 9  # decimals of a second: removes the rounding of frame times
-
-
-@dataclass(frozen=True)
-class Onset:
-    """The instant from which events are judged.
-
-    at_s: begin of the fault as declared; None without a fault. rate_hz: rate of the frames; None for a
-    recorded log, whose fault begins between frames.
-    """
-
-    at_s: Quantity
-    rate_hz: Quantity = None
-
-    @property
-    def first_frame_with_fault_s(self) -> float:
-        """Time of the first frame with the fault, s; infinite without a fault."""
-        if self.at_s is None:
-            return inf
-        return self.at_s if self.rate_hz is None else first_frame_s(self.at_s, self.rate_hz)
-
-    def is_false(self, time_s: Any) -> Any:
-        """Whether an alarm at a time, or at each time of an array, is false: the fault has not begun."""
-        return is_before(time_s, inf if self.at_s is None else self.at_s)
-
-    def delay_s(self, time_s: Quantity) -> Quantity:
-        """Time from the first frame with the fault to an event, s; None without an event, or for one before
-        the fault."""
-        if time_s is None or self.is_false(time_s):
-            return None
-        return round(max(time_s - self.first_frame_with_fault_s, 0.0), _TIME_DECIMALS)
-
-
-def strikes_within(at_s: Any, flown_s: Any) -> Any:
-    """Whether a fault, or each fault of an array, begins before its flight ends. NaN, no fault, gives
-    False."""
-    return at_s < flown_s
-
-
-def is_late(delay_s: Any, guaranteed_delay_s: Any, frame_s: Any) -> Any:
-    """Whether a detection, or each one of an array, came more than a frame after the instant from which it
-    was certain: delay > guaranteed delay + frame, s."""
-    return delay_s > guaranteed_delay_s + frame_s + TIME_TOLERANCE_S
-
-
-@dataclass(frozen=True)
-class Truth:
-    """The faults that are injected in a flight, in the order in which they strike.
-
-    removed_surfaces: surfaces that damage takes away. outside_class_from_second_fault: an unanticipated fault
-    that stands for all faults together. It begins when a second surface fails, since no single fault explains
-    the flight from then on. None if one surface fails at most, or if the diagnosis tests pairs of faults.
-
-    A name is compared with one fault. Its delay counts from the first frame with this fault, and is None if
-    the name is premature, that is, given before the fault began:
-
-        the name is right for       compared with                   correct
-        a fault in force then       the first of these              yes
-        other faults only           the first of these              no if premature; yes if it has ended
-        no fault                    the first fault that strikes    no
-        (no name)                   the first fault that strikes    None
-
-    `DeclaredFault.is_named_by` says which names are right. `unanticipated` is also right for the fault
-    outside of the class, once this one has begun. A wrong name in a window, or of several, is compared with
-    no fault.
-    """
-
-    faults: tuple[DeclaredFault, ...]
-    rate_hz: float
-    removed_surfaces: frozenset[str] = frozenset()
-    outside_class_from_second_fault: DeclaredFault | None = None
-
-    @classmethod
-    def of(cls, scenario: Any) -> Self:
-        """The truth of a `schema.Scenario`."""
-        faults = sorted(map(DeclaredFault.of_scenario, scenario.faults), key=lambda fault: fault.at_s)
-        damage = scenario.airframe.damage
-        cases = [fault.case for fault in scenario.faults if isinstance(fault, Damage)]
-        removed_surfaces = frozenset(surface for case in cases for surface in damage[case].takes)
-        began_s = sorted(failing(scenario).values())
-        outside = None
-        if not scenario.fdi.pairs and len(began_s) > 1:
-            outside = DeclaredFault(None, UNANTICIPATED, began_s[1])
-        return cls(tuple(faults), scenario.rate_hz, removed_surfaces, outside)
-
-    @property
-    def first(self) -> DeclaredFault | None:
-        """The fault that strikes first."""
-        return self.faults[0] if self.faults else None
-
-    @property
-    def onset(self) -> Onset:
-        """The begin of the first fault."""
-        return self.onset_of(self.first)
-
-    def onset_of(self, fault: DeclaredFault | None) -> Onset:
-        """The begin of a fault; without a fault, an onset that never comes."""
-        return Onset(None if fault is None else fault.at_s, self.rate_hz)
-
-    def within(self, acting: Sequence[DeclaredFault]) -> Self:
-        """The truth of a window in which these faults act."""
-        surfaces = {fault.actuator for fault in acting if fault.actuator is not None}
-        outside = self.outside_class_from_second_fault if len(surfaces) > 1 else None
-        return replace(self, faults=tuple(acting), outside_class_from_second_fault=outside)
-
-    def against(self, name: str | None, time_s: Quantity) -> DeclaredFault | None:
-        """The fault with which a name given at `time_s` is compared. Among the faults for which the name is
-        right: the first one in force then, or else the first one that strikes. None if there is no such
-        fault."""
-        faults = self.faults_named_rightly_by(name, time_s)
-        in_force = (fault for fault in faults if time_s is not None and is_in_force(fault, time_s))
-        return next(in_force, faults[0] if faults else None)
-
-    def is_type_right(self, fault: DeclaredFault | None, kind: str | None, time_s: Quantity) -> bool | None:
-        """Whether a type named at `time_s` is the type of `fault`, or of another fault that acts on the same
-        surface then. None if no type is named, or if `fault` has no type that can be named; without `fault`,
-        a named type is wrong."""
-        if fault is None:
-            return None if kind is None else False
-        others = [
-            other for other in acting_at(self.faults, time_s or 0.0) if other.actuator == fault.actuator
-        ]
-        verdicts = [other.is_of_type(kind) for other in (fault, *(others if fault.actuator else ()))]
-        return None if verdicts[0] is None else any(verdicts)
-
-    def faults_named_rightly_by(self, name: str | None, time_s: Quantity) -> tuple[DeclaredFault, ...]:
-        """The faults for which a name given at `time_s` is right, in the order in which they strike."""
-        candidates = self.faults
-        outside = self.outside_class_from_second_fault
-        if outside is not None and time_s is not None and not self.onset_of(outside).is_false(time_s):
-            candidates += (outside,)
-        return tuple(fault for fault in candidates if fault.is_named_by(name, self.removed_surfaces))
-
-    def is_premature(self, name: str | None, time_s: Quantity, fault: DeclaredFault | None) -> bool | None:
-        """Whether a name was given before `fault` began. fault: the one with which the name is compared. None
-        without a name."""
-        if name is None or time_s is None:
-            return None
-        return fault is not None and self.onset_of(fault).is_false(time_s)
-
-
-# Conditions of the hints.
-TAKEN_OVER = "reallocated"  # mode that replaces the named surface
-LONG_S = 1.0  # a reallocation that begins so long after the name is late
-NEAR_THRESHOLD_SHARE = 0.9  # a residual of a healthy flight beyond this share of its threshold is near it
-DRIFT_MPS, DRIFT_M = 5.0, 300.0  # a larger change of airspeed or altitude over the flight is a drift
 
 
 def metrics(flight: "Landing") -> Document:
@@ -212,7 +53,7 @@ def _declared(flight: "Landing", truth: Truth) -> Document:
             airspeed_mps=scenario.initial.airspeed_mps,
             altitude_m=scenario.initial.altitude_m,
             rate_hz=scenario.rate_hz,
-            flown_s=round(flight.frames / scenario.rate_hz, _TIME_DECIMALS),
+            flown_s=round(flight.frames / scenario.rate_hz, TIME_DECIMALS),
             scheme=scenario.fdi.scheme,
             fault_class=scenario.fdi.fault_class,
             law=scenario.control.law,
@@ -429,95 +270,3 @@ def _change(change: Document, truth: Truth) -> Document:
     """A change in flight; if it ended a diagnosis with an alarm, also whether this alarm was false."""
     alarm_s = change.get("detection_time_s")
     return change if alarm_s is None else change | {"false_alarm": truth.onset.is_false(alarm_s)}
-
-
-def hints(flight: "Landing", flight_metrics: Metrics) -> list[str]:
-    """Notes without which a reader could misunderstand the verdict, a sentence each."""
-    scenario = flight.scenario
-    of_diagnosis = (
-        _hint_alarm_in_one_frame(scenario, flight_metrics),
-        "" if scenario.fdi.pairs else of_several(scenario),
-        _hint_fault_too_small(scenario, flight_metrics),
-    )
-    sentences = (
-        *(of_diagnosis if scenario.fdi.diagnoses else ()),
-        _hint_residual_near_threshold(flight),
-        _hint_late_reallocation(flight_metrics),
-        _hint_drift(flight),
-    )
-    return [sentence for sentence in sentences if sentence]
-
-
-def _hint_fault_too_small(scenario: "Scenario", flight_metrics: Metrics) -> str:
-    """A fault without an alarm, and without an instant from which an alarm was certain."""
-    detection = flight_metrics.detection
-    is_detectable = detection.detected or detection.guaranteed_delay_s is not None
-    if not scenario.faults or is_detectable or detection.inconclusive:  # `inconclusive` has its own line
-        return ""
-    return (
-        "no alarm, and no alarm was guaranteed: the effect of the fault stayed within the uncertainty that "
-        "fdi.bounds declares; a larger fault, a stronger reference or tighter bounds would make it detectable"
-    )
-
-
-def _hint_alarm_in_one_frame(scenario: "Scenario", flight_metrics: Metrics) -> str:
-    """An alarm in the first frame of the fault shows nothing about flights with errors, noise or wind."""
-    delay_s = flight_metrics.detection.delay_s
-    frame_s = 1.0 / scenario.rate_hz
-    if delay_s is None or delay_s > frame_s + TIME_TOLERANCE_S:
-        return ""
-    if not (scenario.sensors.is_ideal and scenario.actuators.is_ideal and scenario.environment.is_still):
-        return ""
-    if not declares_all(scenario):
-        return ""
-    return (
-        f"the alarm came within one frame ({frame_s:.2g} s): sensors exact, servos ideal, the air "
-        "is still, and all errors are declared"
-    )
-
-
-def _hint_residual_near_threshold(flight: "Landing") -> str:
-    """The residual nearly reaches its threshold in healthy flight: a slightly larger error than declared
-    would exceed it."""
-    share = max(flight.closest_approach, default=0.0)
-    if not NEAR_THRESHOLD_SHARE <= share <= 1.0:
-        return ""
-    when = " before the fault" if flight.scenario.faults else ""
-    return (
-        f"the residual already reaches {math.floor(1000.0 * share) / 10.0:g} % of its threshold{when}: a "
-        "slightly larger error would raise a false alarm"
-    )
-
-
-def _hint_late_reallocation(flight_metrics: Metrics) -> str:
-    """Why the demand of a named surface was reallocated late: only a surface that is certainly weak or stuck
-    is replaced. No hint for several faults, as the modes do not say which surface was replaced."""
-    isolation = flight_metrics.isolation
-    begun_s = [change.time_s for change in flight_metrics.supervisor if change.mode == TAKEN_OVER]
-    if not begun_s or isolation.faults or isolation.time_s is None:
-        return ""
-    if begun_s[0] - isolation.time_s < LONG_S:
-        return ""
-    return (
-        f"{isolation.fault} was named at {isolation.time_s:.2f} s; its demand was reallocated at "
-        f"{begun_s[0]:.2f} s, when it was certain that the surface is weak or stuck. The law would have "
-        "corrected an offset or a slow surface without reallocation"
-    )
-
-
-def _hint_drift(flight: "Landing") -> str:
-    """Airspeed or altitude changed by more than DRIFT_MPS or DRIFT_M, because no autopilot held them."""
-    if flight.end is None or flight.scenario.autopilot:
-        return ""
-    initial = flight.scenario.initial
-    airspeed_mps, altitude_m = flight.end
-    ends = (
-        ("airspeed", initial.airspeed_mps, airspeed_mps, DRIFT_MPS, "m/s"),
-        ("altitude", initial.altitude_m, altitude_m, DRIFT_M, "m"),
-    )
-    drifts = [
-        f"{quantity} {'fell' if end < begin else 'rose'} from {begin:.0f} to {end:.0f} {unit}"
-        for quantity, begin, end, limit, unit in ends
-        if abs(end - begin) > limit
-    ]
-    return f"{' and '.join(drifts)} (only the body rates are controlled in this scenario)" if drifts else ""

@@ -51,9 +51,8 @@ def painters() -> Iterator[Painters]:
 
 def _can_fork() -> bool:
     """Whether painters can work beside this process, and a fork copies no lock that another thread holds."""
-    if not sys.platform.startswith("linux") or len(os.sched_getaffinity(0)) < N_PAINTERS:
-        return False
-    return threading.active_count() == 1
+    is_alone = threading.active_count() == 1
+    return is_alone and sys.platform.startswith("linux") and len(os.sched_getaffinity(0)) >= N_PAINTERS
 
 
 @contextmanager

@@ -85,7 +85,12 @@ def verdict_lines(metrics: Metrics) -> list[tuple[str, str]]:
             ("" if i else "windows", _window_text(window, metrics))
             for i, window in enumerate(metrics.windows or ())
         ),
-        ("probing", _if_there(_probing_text, isolation.probing_s)),
+        (
+            "probing",
+            _if_there(
+                lambda span_s: f"flap and elevator moved from {_span_text(*span_s)}", isolation.probing_s
+            ),
+        ),
         ("supervisor", _supervisor_text(metrics)),
         *(("changed", _change_text(change)) for change in metrics.changes),
         ("engine power", _filled(_ENGINE_POWER_FORM, metrics.engine_power)),
@@ -451,10 +456,6 @@ def _named_fault_text(isolation: Named, metrics: Metrics) -> str:
         right = f"PREMATURE at {_seconds_text(isolation.time_s)}"
     size = _estimate_text(isolation) + _true_size_text(isolation, metrics)
     return f"{isolation.fault}{remaining}{when}; {right}{_type_text(isolation)}{size}"
-
-
-def _probing_text(span_s: tuple[float, float]) -> str:
-    return f"flap and elevator moved from {_span_text(*span_s)}"
 
 
 def _type_text(isolation: Named) -> str:

@@ -229,12 +229,12 @@ def _profile_view(limited: bool, power: str, within_mps: float | None) -> View:
 
 def _mean_airspeed_traces(within_mps: float | None) -> list[tuple[Any, ...]]:
     """Traces of the mean airspeed, and of the limits that the scenario expects of it."""
-    mean = [(MEAN_AIRSPEED_COLUMN, "10 s mean", "residual")]
+    mean = MEAN_AIRSPEED_COLUMN, "10 s mean", "residual"
     if within_mps is None:
-        return [*mean]
+        return [mean]
     bound = f"± {within_mps:g} m/s, expected of the mean"
     upper = COMMANDED_AIRSPEED_COLUMN, bound, "bound", 1.0, within_mps
-    return [*mean, upper, (COMMANDED_AIRSPEED_COLUMN, "", "bound", 1.0, -within_mps)]
+    return [mean, upper, (COMMANDED_AIRSPEED_COLUMN, "", "bound", 1.0, -within_mps)]
 
 
 def surfaces_by_kind(names: Names) -> dict[str, list[str]]:

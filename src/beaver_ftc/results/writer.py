@@ -20,14 +20,12 @@ if TYPE_CHECKING:
 
 CERTIFICATE_FILE = "certificate.json"
 
-Progress = Callable[[float], None]
-
 
 def run(
     scenario: "Scenario",
     out: Path,
     report: bool = True,
-    progress: Progress | None = None,
+    progress: Callable[[float], None] | None = None,
     exports: Collection[str] = (),
     prepare: "Callable[[Plant], None] | None" = None,
     recording: str | None = None,

@@ -22,7 +22,8 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.documents.files import Document
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.loop.outcome import Landing
-from beaver_ftc.results.metrics import Truth, as_json, fault_free_s, is_late
+from beaver_ftc.results.judgement import Truth, is_late
+from beaver_ftc.results.metrics import as_json, fault_free_s
 from beaver_ftc.scenario.faults import LossOfEffectiveness
 from beaver_ftc.scenario.signals import grown_share
 from beaver_ftc.studies.engine.statistics import CONFIDENCE, binomial, poisson_bound, share_within

@@ -38,7 +38,7 @@ import numpy as np
 from beaver_ftc.documents.errors import BeaverFtcError
 from beaver_ftc.loop.loop import Loop, fly
 from beaver_ftc.plugins import DETECTORS, LAWS
-from beaver_ftc.results.metrics import Truth
+from beaver_ftc.results.judgement import Truth
 from beaver_ftc.studies.compare.margins_in_flight import margins_of
 from beaver_ftc.studies.compare.trial import (
     CALIBRATION,

@@ -18,7 +18,7 @@ from beaver_ftc.loop.loop import Loop
 from beaver_ftc.loop.noting import Notes
 from beaver_ftc.loop.readout import switch_statistical_tests
 from beaver_ftc.plugins import DETECTORS, made
-from beaver_ftc.results.metrics import Onset, Truth
+from beaver_ftc.results.judgement import Onset, Truth
 from beaver_ftc.scenario.schema import Scenario
 
 Rises = tuple[tuple[float, float], ...]

@@ -18,7 +18,8 @@ from beaver_ftc.documents.files import data_root
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.loop.outcome import Landing
 from beaver_ftc.plugins import DETECTORS, LAWS, is_compiled
-from beaver_ftc.results.metrics import measure, strikes_within
+from beaver_ftc.results.judgement import strikes_within
+from beaver_ftc.results.metrics import measure
 from beaver_ftc.results.model import Rates
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.diagnosis import Statistical

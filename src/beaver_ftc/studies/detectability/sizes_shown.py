@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from math import inf
 
-from beaver_ftc.results.metrics import NEAR_THRESHOLD_SHARE
+from beaver_ftc.results.hints import NEAR_THRESHOLD_SHARE
 from beaver_ftc.results.model import Document
 from beaver_ftc.studies.detectability.shown import NAME, table
 from beaver_ftc.studies.present.page import Makers, Part, study_files

@@ -8,7 +8,7 @@ import numpy as np
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.documents.files import Document
 from beaver_ftc.loop.loop import fly
-from beaver_ftc.results.metrics import Truth
+from beaver_ftc.results.judgement import Truth
 from beaver_ftc.scenario.schema import Scenario, load_scenario
 from beaver_ftc.studies.mismatch.split import split_flight
 

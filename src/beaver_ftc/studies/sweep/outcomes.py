@@ -7,7 +7,7 @@ from typing import IO
 import numpy as np
 
 from beaver_ftc.aircraft import AXES
-from beaver_ftc.results.metrics import strikes_within
+from beaver_ftc.results.judgement import strikes_within
 from beaver_ftc.scenario.sweeps import Sweep
 from beaver_ftc.studies.sweep.one_flight import DEPARTED, RESULTS, kind_of
 

@@ -13,7 +13,8 @@ from functools import partial
 import numpy as np
 
 from beaver_ftc.aircraft import AXES
-from beaver_ftc.results.metrics import NEAR_THRESHOLD_SHARE, is_late
+from beaver_ftc.results.hints import NEAR_THRESHOLD_SHARE
+from beaver_ftc.results.judgement import is_late
 from beaver_ftc.results.model import Document
 from beaver_ftc.scenario.faults import UNANTICIPATED
 from beaver_ftc.scenario.sweeps import AxisLevels, Level, QuantileLevel, Sweep, SweepExpect

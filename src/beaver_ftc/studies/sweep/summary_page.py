@@ -10,7 +10,7 @@ from math import floor, log10
 from pathlib import Path
 
 from beaver_ftc.aircraft import AXES
-from beaver_ftc.results.metrics import NEAR_THRESHOLD_SHARE
+from beaver_ftc.results.hints import NEAR_THRESHOLD_SHARE
 from beaver_ftc.results.model import Document, Expectation, Judged
 from beaver_ftc.results.verdict import printed, verdict_table
 from beaver_ftc.studies.present.page import (

@@ -13,6 +13,7 @@ from beaver_ftc.results.views import (
     Trace,
     View,
     estimators,
+    power_column,
     surfaces,
     views,
 )
@@ -40,6 +41,12 @@ def test_which_views_a_log_allows():
     assert estimators(EVERY) == ("aileron", "elevator", "rudder")
     assert surfaces(EVERY) == ("aileron", "elevator", "rudder", "flap")
     assert views(["t_s"]) == ()
+
+
+def test_the_column_of_the_engine_power_is_neither_of_the_monitor_nor_a_difference():
+    before, first = ("detected", "watch_share", "watch_test", "watch_missing"), "altitude_command_m"
+    assert power_column((*before, first)) == ""
+    assert power_column((*before, "throttle", "left_difference", first)) == "throttle"
 
 
 T_S = np.arange(0.0, 20.0, 0.5)

@@ -22,6 +22,7 @@ from beaver_ftc.results.series import (
     source_columns,
 )
 from beaver_ftc.scenario.diagnosis import MODES
+from beaver_ftc.scenario.sensors import N_IN_EQUATIONS, ROWS
 
 AXIS_NAMES = {axis: f"{motion} rate {axis}" for axis, motion in MOTION_OF_AXIS.items()}
 
@@ -29,6 +30,8 @@ SIDES = ("left", "right")
 SURFACE_ROLES = tuple(f"surface {i}" for i in range(8))  # roles of the surfaces, in the order of the aircraft
 ATTAINABLE_AIRSPEED_COLUMN = "airspeed_limited_mps"  # the commanded airspeed, as far as it can be held
 BEAVER_POWER_COLUMN = "manifold_pressure_inhg"
+# Columns that may stand before that of the engine power: alarm, sensor monitor, sensors of the monitor alone.
+_BEFORE_POWER = {"detected", "watch_test", "watch_missing", *(row.column for row in ROWS[N_IN_EQUATIONS:])}
 AXIS_QUANTILES = 0.005, 0.995  # these quantiles set an axis that clips spikes
 MEAN_AIRSPEED_EXPECTATION = "airspeed_within_mps"  # the expectation about the mean airspeed
 
@@ -165,16 +168,17 @@ def views(columns: Names, power: bool = False, within_mps: float | None = None) 
 def power_column(columns: Names) -> str:
     """The log column of the engine power that is commanded along a profile; empty if there is none.
 
-    The Beaver always has BEAVER_POWER_COLUMN. The column of another aircraft stands directly before
-    `altitude_command_m`, the first command of the profile; without such a column, `detected` or `watch_test`
-    stands there.
+    The Beaver always has BEAVER_POWER_COLUMN. The column of another aircraft stands before the differences of
+    its engines and `altitude_command_m`, the first command of the profile; without such a column, one of
+    _BEFORE_POWER stands there.
     """
     if BEAVER_POWER_COLUMN in columns:
         return BEAVER_POWER_COLUMN
     if "altitude_command_m" not in columns:
         return ""
-    neighbour = list(columns)[list(columns).index("altitude_command_m") - 1]
-    return "" if neighbour in ("detected", "watch_test") else neighbour
+    before = columns[: columns.index("altitude_command_m")]
+    neighbour = [name for name in before if not name.endswith("_difference")][-1]
+    return "" if neighbour in _BEFORE_POWER else neighbour
 
 
 def _panel(label: str, *traces: tuple[Any, ...], **fields: Any) -> Panel:

@@ -373,9 +373,9 @@ def load_all(names: list[str]) -> list["Scenario"]:
             check_flyable(loaded[-1], name)
         except BadInput as error:
             mistakes.append(str(error))
-    given = [scenario.name for scenario in loaded]
-    twice = dict.fromkeys(name for name in given if given.count(name) > 1)
-    mistakes += [f"two scenarios are named {name}: one result would replace the other" for name in twice]
+    for name, count in Counter(scenario.name for scenario in loaded).items():
+        if count > 1:
+            mistakes.append(f"two scenarios are named {name}: one result would replace the other")
     if mistakes:
         raise BadInput("\n".join(mistakes))
     return loaded

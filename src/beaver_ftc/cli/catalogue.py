@@ -156,13 +156,9 @@ def schema(sweep: bool = False, plan: bool = False) -> None:
     if plan:
         from beaver_ftc.plugins import required
 
-        emit_json(required("plan_json_schema", "schema --plan")())
-        return
-    if sweep:
-        from beaver_ftc.scenario.sweeps import sweep_json_schema
-
-        emit_json(sweep_json_schema())
-        return
-    from beaver_ftc.scenario.schema import json_schema
-
+        json_schema = required("plan_json_schema", "schema --plan")
+    elif sweep:
+        from beaver_ftc.scenario.sweeps import sweep_json_schema as json_schema
+    else:
+        from beaver_ftc.scenario.schema import json_schema
     emit_json(json_schema())

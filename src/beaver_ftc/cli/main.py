@@ -63,10 +63,9 @@ class Row(TyperCommand):
 
     def read(self) -> Callable[..., None]:
         """What the row names, as typer reads it."""
-        found = loaded(self.target)
-        if isinstance(found, type):
-            return as_typer_reads(command_of(found), getattr(found, "PLUGINS", True))
-        return as_typer_reads(found, getattr(found, "PLUGINS", True))
+        target = loaded(self.target)
+        command = command_of(target) if isinstance(target, type) else target
+        return as_typer_reads(command, getattr(target, "PLUGINS", True))
 
     def whole(self) -> Any:
         """The command with its options and its help; the examples at its end on lines of their own."""

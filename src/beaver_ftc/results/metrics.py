@@ -20,7 +20,8 @@ from beaver_ftc.results import model
 from beaver_ftc.results.expectations import evaluate
 from beaver_ftc.results.hints import hints
 from beaver_ftc.results.judgement import TIME_DECIMALS, Onset, Truth
-from beaver_ftc.results.model import DeclaredFault, Document, Metrics, Quantity, rounded
+from beaver_ftc.results.model import DeclaredFault, Document, Metrics, Quantity
+from beaver_ftc.results.part import rounded
 from beaver_ftc.scenario.faults import acting_at, is_share, size_at
 from beaver_ftc.scenario.warnings import outside_class
 

@@ -8,7 +8,8 @@ from collections.abc import Callable, Iterator
 from functools import cache, partial
 from typing import Any, NamedTuple, get_args, get_origin, get_type_hints
 
-from beaver_ftc.results.model import Metrics, Window, without_none
+from beaver_ftc.results.model import Metrics, Window
+from beaver_ftc.results.part import without_none
 
 WORST_RATIO = "worst_residual_ratio"
 Getter = Callable[[Metrics], Any]

@@ -1,8 +1,7 @@
-"""The command `beaver-ftc`: its commands, and what becomes of errors.
+"""The program `beaver-ftc`: its commands by the rows of `commands.py`, its errors and its exit status.
 
-`commands.py` has a row each. A command is a study, or a thin function of a module of this package. Its
-docstring is its help: what it does, examples, what each option means. `--help` must answer at once. A
-study as a command has its options, a progress bar, its answer and its exit status, the same for all.
+A row names a study or a function. The docstring is the help of the command: what it does, examples, and each
+option. The module of a command is imported when the command is called, so that `--help` answers at once.
 """
 
 import signal
@@ -19,7 +18,6 @@ from beaver_ftc.cli import (
     Format,
     FormatOption,
     answer,
-    as_typer_reads,
     complain,
     failure_of,
     progress_bar,
@@ -27,31 +25,33 @@ from beaver_ftc.cli import (
     report_last,
     status_of_stop,
 )
+from beaver_ftc.cli.parameters import as_typer_reads
 from beaver_ftc.commands import Reporter, StudyCommand
 from beaver_ftc.documents.errors import Stopped
 from beaver_ftc.plugins import loaded
 
 
 def command_of(study: type[StudyCommand]) -> Callable[..., None]:
-    """The command that runs a study; its parameters are the study's fields and `format`."""
+    """The command that runs a study, with a progress bar, and prints its answer. Its parameters are the
+    fields of the study and `format`. The exit status is 1 if the study is not passed."""
 
     def command(format: Format, **options: Any) -> None:
-        asked = study(**options)
-        with progress_bar(asked.label) as progress:
-            document = asked.run(Reporter(progress, complain))
-        answer(format, document, lambda: asked.as_text(document, sys.stdout.isatty()))
-        if not asked.passed(document):
+        configured = study(**options)
+        with progress_bar(configured.label) as progress:
+            document = configured.run(Reporter(progress, complain))
+        answer(format, document, lambda: configured.as_text(document, sys.stdout.isatty()))
+        if not configured.passed(document):
             raise typer.Exit(1)
 
-    own = signature(study).parameters.values()
+    fields = signature(study).parameters.values()
     last = Parameter("format", Parameter.KEYWORD_ONLY, default=Format.text, annotation=FormatOption)
-    command.__signature__ = Signature([*own, last])  # type: ignore[attr-defined]
+    command.__signature__ = Signature([*fields, last])  # type: ignore[attr-defined]
     command.__doc__ = study.__doc__
     return command
 
 
 class Row(TyperCommand):
-    """A command by its row: its summary is read from the source, the rest imported when it is called."""
+    """A command by its row. Its summary is read from the source; its module is imported by `read`."""
 
     def __init__(self, name: str, target: str) -> None:
         super().__init__(name)
@@ -62,51 +62,51 @@ class Row(TyperCommand):
         return TyperCommand(self.name, help=commands.summary(self.target)).get_short_help_str(limit)
 
     def read(self) -> Callable[..., None]:
-        """What the row names, as typer reads it."""
+        """The study or function of the row, as typer reads it."""
         target = loaded(self.target)
         command = command_of(target) if isinstance(target, type) else target
         return as_typer_reads(command, getattr(target, "PLUGINS", True))
 
     def whole(self) -> Any:
-        """The command with its options and its help; the examples at its end on lines of their own."""
-        read = self.read()
-        read.__doc__, _, examples = str(read.__doc__).partition("\n\nExamples:\n")
-        alone = typer.Typer(add_completion=False, rich_markup_mode=None)
-        alone.command(self.name, epilog=f"\b\nExamples:\n{examples}" if examples else None)(read)
-        return typer.main.get_command(alone)
+        """The command with its options and its help. The examples are its epilog, each on its own line."""
+        function = self.read()
+        function.__doc__, _, examples = str(function.__doc__).partition("\n\nExamples:\n")
+        program = typer.Typer(add_completion=False, rich_markup_mode=None)
+        program.command(self.name, epilog=f"\b\nExamples:\n{examples}" if examples else None)(function)
+        return typer.main.get_command(program)
 
 
 class Rows(TyperGroup):
-    """Commands by their rows, those of a group without its name."""
+    """The commands of the program, or of a group, by their rows."""
 
     def __init__(self, **attributes: Any) -> None:
         super().__init__(**attributes)
-        above = f"{self.name} " if self.name in commands.groups() else ""
+        group = f"{self.name} " if self.name in commands.groups() else ""
         for name, target in commands.registered().items():
-            last = name.removeprefix(above)
-            if name.startswith(above) and " " not in last:
+            last = name.removeprefix(group)
+            if name.startswith(group) and " " not in last:
                 self.add_command(Row(last, target))
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
-        """Those of the program by topic, on one screen."""
+        """Write the commands of the program by topic, on one screen; those of a group, one in a line."""
         if ctx.parent is not None:
             super().format_commands(ctx, formatter)
             return
         rows = [
-            (topic, "; ".join(f"{name}: {says}".removesuffix(": ") for name, says in of.items()))
-            for topic, of in commands.topics(self.commands).items()
+            (topic, "; ".join(f"{name}: {text}".removesuffix(": ") for name, text in summaries.items()))
+            for topic, summaries in commands.topics(self.commands).items()
         ]
         with formatter.section("Commands"):
             formatter.write_dl(rows)
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        """The command that is called, whole; by a former name with a notice."""
+        """The command that is called, with its options. A former name gives a notice on standard error."""
         if ctx.parent is None and args[0] in commands.FORMER:
-            now = commands.FORMER[args[0]]
-            complain(f"{args[0]} is a former name: type beaver-ftc {' '.join(now)}")
-            args = [*now, *args[1:]]
-        name, command, rest = super().resolve_command(ctx, args)
-        return name, command.whole() if isinstance(command, Row) else command, rest
+            present = commands.FORMER[args[0]]
+            complain(f"{args[0]} is a former name: type beaver-ftc {' '.join(present)}")
+            args = [*present, *args[1:]]
+        name, command, arguments = super().resolve_command(ctx, args)
+        return name, command.whole() if isinstance(command, Row) else command, arguments
 
 
 app = typer.Typer(
@@ -139,21 +139,23 @@ def options(
     """
 
 
-for _name, _says in commands.groups().items():
-    _group = typer.Typer(name=_name, cls=Rows, help=_says, no_args_is_help=True, rich_markup_mode=None)
+for _name, _help in commands.groups().items():
+    _group = typer.Typer(name=_name, cls=Rows, help=_help, no_args_is_help=True, rich_markup_mode=None)
     app.add_typer(_group, context_settings={"help_option_names": ["-h", "--help"]})
 
 
 def every_command() -> dict[str, Any]:
-    """Each command by name, whole, with its options and its help."""
+    """Each command by name, with its options and its help."""
     return {name: Row(name.rpartition(" ")[2], at).whole() for name, at in commands.registered().items()}
 
 
 def _stop(received: int, _: object) -> NoReturn:
+    """End the command after a signal, by an exception, so that it removes what it has half written."""
+
     def lose(lost: Any) -> None:
         if issubclass(lost.exc_type, (KeyboardInterrupt, Stopped)):
             repeat(received)
-        # else: of an object that the signal leaves half made nobody needs to read
+        # otherwise: the signal left an object half made, whose error has no reader
 
     sys.unraisablehook = lose
     raise Stopped(128 + received)
@@ -161,13 +163,13 @@ def _stop(received: int, _: object) -> NoReturn:
 
 def main() -> NoReturn:
     """Run the command line; an error becomes a line on standard error and the exit status of its kind."""
-    for name in ("SIGTERM", "SIGHUP"):  # unwind: leave nothing half written
+    for name in ("SIGTERM", "SIGHUP"):
         number = getattr(signal, name, None)
         if number is not None and signal.getsignal(number) is signal.SIG_DFL:  # not under nohup
             signal.signal(number, _stop)
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
-            stream.reconfigure(errors="replace")  # a terminal that lacks a letter is no reason to fail
+            stream.reconfigure(errors="replace")  # a letter that the terminal lacks is replaced
     try:
         app()
     except Exception as error:

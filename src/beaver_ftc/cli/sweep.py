@@ -107,7 +107,7 @@ _NOT_WITH_RARE = ("search", "replay", "junit", "ray_address", "backend", "keep_l
 
 def _rare(sweep: "Sweep", arguments: Arguments) -> None:
     """Estimate the probability that an expectation is not met, with its interval."""
-    from beaver_ftc.cli import told
+    from beaver_ftc.cli.progress import progress_lines
     from beaver_ftc.studies.engine.processes import cores
     from beaver_ftc.studies.engine.study import run_into
     from beaver_ftc.studies.sweep.rare import as_text, rare_study
@@ -116,8 +116,8 @@ def _rare(sweep: "Sweep", arguments: Arguments) -> None:
     given = [name for name in _NOT_WITH_RARE if getattr(arguments, name) != getattr(usual, name)]
     if given:
         raise BadInput(f"--rare and --{given[0].replace('_', '-')} exclude each other, allowed: one of them")
-    with told() as tell:
-        study = rare_study(sweep, str(arguments.rare), tell)
+    with progress_lines() as write_line:
+        study = rare_study(sweep, str(arguments.rare), write_line)
         document = run_into(study, arguments.out, arguments.workers or cores())
     answer(arguments.format, document, lambda: as_text(document))
 
@@ -153,11 +153,11 @@ def _keep(flights: str, certified: bool = False) -> "Keep":
 
 
 def _fly(sweep: "Sweep", options: "Options", format: Format) -> "Judged":
-    from beaver_ftc.cli import live_progress
+    from beaver_ftc.cli.progress import sweep_progress
     from beaver_ftc.studies.sweep.campaign import named_for, run_sweep
     from beaver_ftc.studies.sweep.summary_page import summary_text, verdict
 
-    with _stoppable() as stopped, live_progress(sweep.name) as progress:
+    with _stoppable() as stopped, sweep_progress(sweep.name) as progress:
         document = run_sweep(sweep, options, progress, stopped)
     document |= {"folder": str(options.out / named_for(sweep, options.search).name)}
     answer(format, document, lambda: summary_text(document, colour=sys.stdout.isatty()))

@@ -49,8 +49,7 @@ os.execv(sys.argv[1], sys.argv[1:])
 """
 
 
-@pytest.mark.parametrize("seconds", [3.0])
-def test_tuning_that_is_ended_says_nothing(tmp_path, seconds):
+def test_tuning_that_is_ended_says_nothing(tmp_path):
     """Before its workers have started and while they fly; what the rivals ship with is as it was."""
     from beaver_ftc.diagnosis.rivals import TUNED_FILE
 
@@ -58,7 +57,7 @@ def test_tuning_that_is_ended_says_nothing(tmp_path, seconds):
     command = [sys.executable, "-c", HEARD_AGAIN, BEAVER, "compare", "--tune", "--workers", "2"]
     environment = {**os.environ, "COLUMNS": "80"}
     with subprocess.Popen(command, cwd=tmp_path, env=environment, stderr=subprocess.PIPE) as running:
-        time.sleep(seconds)
+        time.sleep(3.0)
         assert running.poll() is None
         running.send_signal(signal.SIGTERM)
         said = running.communicate(timeout=30)[1]

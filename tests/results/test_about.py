@@ -46,7 +46,6 @@ def _hints(
         ),
         ([], {"used": (0.95, 0.2)}, "reaches 95 % of its threshold: a slightly larger error"),
         ([LOSS], {"delay": 0.01}, r"within one frame \(0.01 s\): sensors exact, servos ideal"),
-        ([LOSS], {"delay": 0.05, "rate_hz": 20}, r"within one frame \(0.05 s\)"),
         ([LOSS], {"delay": 1 / 60 + 5e-10, "rate_hz": 60}, r"within one frame \(0.017 s\)"),
         ([LOSS], {"used": (0.2, 0.99996)}, r"the residual already reaches 99.9 % of its threshold"),
         ([], {"end": (45.0, 1500.0)}, "altitude fell from 1829 to 1500 m"),

@@ -31,8 +31,6 @@ def test_published_case_has_every_key_of_the_contract_in_order():
         "names": ["elevator"], "probing_s": None, "faults": [],
     }  # fmt: skip
     assert document["false_alarm"] is False
-    assert document["supervisor"][1] == {"time_s": 12.07, "mode": "adaptive"}
-    assert set(document["versions"]) == {"beaver-ftc", "jsbsim", "numpy", "numba", "python"}
 
 
 def test_what_is_not_finite_becomes_null_and_json_stays_json():

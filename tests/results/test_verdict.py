@@ -35,7 +35,6 @@ def test_markup_in_a_name_is_no_markup():
     ("changes", "title", "outcome_class"),
     [
         ({"passed": True}, "PASSED", "good"),
-        ({"passed": True, "departure": None}, "PASSED", "good"),
         ({"passed": True, "departure": {"time_s": 1.0}}, "PASSED, the aircraft was LOST", "lost"),
         ({"departure": {"time_s": 1.0}}, "FAILED, the aircraft was LOST", "bad"),
         ({"interrupted_s": 2.5}, "INTERRUPTED at 2.50 s, not passed", "bad"),

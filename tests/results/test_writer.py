@@ -26,15 +26,6 @@ def _names(folder):
     return sorted(path.name for path in folder.iterdir())
 
 
-def test_result_appears_only_when_it_is_whole(tmp_path):
-    out = tmp_path / "deep" / "runs"
-    with result_folder(out, "case") as folder:
-        (folder / "metrics.json").write_text("new")
-        assert not (out / "case").exists()
-    assert (out / "case" / "metrics.json").read_text() == "new"
-    assert _names(out) == ["case"]
-
-
 def test_new_result_replaces_the_old_one_entirely(tmp_path):
     with result_folder(tmp_path, "case") as folder:
         (folder / "metrics.json").write_text("old")

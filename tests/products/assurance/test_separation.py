@@ -16,7 +16,7 @@ from beaver_ftc.cli.main import main
 from beaver_ftc_assurance.candidates import Candidate, distinguish
 from beaver_ftc_assurance.doublet import Situation, doublet
 from beaver_ftc_assurance.separation import as_text, separate
-from fault_kinds import BIAS, CONSTANT_LOSS, FLOAT, STUCK
+from fault_kinds import BIAS, FLOAT, STUCK
 from samples import samples
 
 SMALL = {
@@ -86,14 +86,6 @@ def test_a_surface_without_effect_shows_no_type():
     pair = distinguish(Candidate(1, STUCK, 0.1, 0.11), Candidate(1, FLOAT, 0.0, 0.0), none, NAMES)
     assert "no direction shows the fault" in pair["because"]
     assert pair["needs"]["elevator"]["at_least_deg"] is None
-
-
-def test_surfaces_that_act_along_two_directions_can():
-    pair = distinguish(
-        Candidate(0, CONSTANT_LOSS, -0.6, -0.5), Candidate(2, CONSTANT_LOSS, -0.9, -0.8), PLAIN, NAMES
-    )
-    assert pair["separates"]
-    assert set(pair["commands_rad"]) == {"aileron", "rudder"}
 
 
 @settings(max_examples=samples(25), deadline=None)

@@ -40,11 +40,12 @@ class Format(StrEnum):
 
 
 # Whether the command must print a JSON document, and whether it has printed one.
-_document = {"asked": False, "given": False}
+_json_document = {"required": False, "printed": False}
 
 
 def _remember(format: Format) -> Format:
-    _document["asked"], _document["given"] = format is Format.json, False
+    """Note the format of the command, for `report_last`."""
+    _json_document["required"], _json_document["printed"] = format is Format.json, False
     return format
 
 
@@ -68,7 +69,8 @@ JunitOption = Annotated[
 
 
 def emit(text: str) -> None:
-    """Write to standard output. A reader that went away is no error; a full disk is (SimulationFailed)."""
+    """Write to standard output. A reader that has closed the pipe is no error. Raises SimulationFailed if the
+    text cannot be written, for example on a full disk."""
     try:
         sys.stdout.write(text if text.endswith("\n") else text + "\n")
         sys.stdout.flush()
@@ -83,7 +85,7 @@ def emit_json(document: Any) -> None:
     """Write one JSON document to standard output."""
     from beaver_ftc.results.metrics import as_json
 
-    _document["given"] = True
+    _json_document["printed"] = True
     emit(as_json(document))
 
 
@@ -101,7 +103,7 @@ def complain(text: str) -> None:
 
 
 def report(error: BeaverFtcError) -> int:
-    """Print an error, with its traceback if BEAVER_FTC_DEBUG is set; returns the exit status."""
+    """Print an error; its traceback instead if BEAVER_FTC_DEBUG is set. Returns the exit status."""
     if os.environ.get("BEAVER_FTC_DEBUG"):
         traceback.print_exception(error)
     else:
@@ -113,7 +115,7 @@ def report_last(error: BeaverFtcError) -> int:
     """`report` the error that ends the command. If it must print a JSON document and has printed none, the
     document has the errors."""
     status = report(error)
-    if _document["asked"] and not _document["given"]:
+    if _json_document["required"] and not _json_document["printed"]:
         with suppress(SimulationFailed):  # standard output that cannot be written is no second error
             emit_json({"errors": str(error).splitlines()})
     return status
@@ -128,10 +130,11 @@ def write_junit(runs: list["Judged"], path: Path | None) -> None:
 
 
 def judged(what: str, format: Format, junit: Path | None, fly: Callable[[], "Judged"]) -> NoReturn:
-    """Run a command with one verdict, and end with its exit status. An error is in JSON and JUnit XML too.
+    """Run a command that has one verdict, and end with its exit status. An error is also written in the JSON
+    document and in JUnit XML.
 
-    what: name of the test suite in JUnit XML if there is no verdict.
-    fly: flies, prints the answer, and returns the verdict.
+    what: name of the test suite in JUnit XML if there is no verdict. fly: flies, prints the answer, and
+    returns the verdict.
     """
     from beaver_ftc.results.model import Judged
 
@@ -150,46 +153,47 @@ def judged(what: str, format: Format, junit: Path | None, fly: Callable[[], "Jud
 
 
 def failure_of(error: Exception) -> BeaverFtcError:
-    """An error of the package as it is; for any other, one with a message of one line and it as its cause."""
+    """An error of the package unchanged. Any other error becomes the cause of an error of the package, whose
+    message is one line."""
     if isinstance(error, BeaverFtcError):
         return error
-    said = " ".join(str(error).split())
+    reason = " ".join(str(error).split())
     if isinstance(error, OSError) and error.errno in (errno.ENAMETOOLONG, errno.ELOOP) and error.filename:
         return BadInput(f"{error.filename}: {str(error.strerror).lower()}, allowed: the path of a file")
     if isinstance(error, MemoryError):
-        text = "there is not enough memory for this" + (f": {said}" if said else "")
+        text = "there is not enough memory for this" + (f": {reason}" if reason else "")
     else:
-        text = f"unexpected {type(error).__name__}: {said} (BEAVER_FTC_DEBUG=1 shows where)"
+        text = f"unexpected {type(error).__name__}: {reason} (BEAVER_FTC_DEBUG=1 shows where)"
     failed = SimulationFailed(text)
     failed.__cause__ = error
     return failed
 
 
 def status_of_stop(error: Exception) -> int | None:
-    """The exit status if a signal stopped compiled code, whose caller sees only a SystemError; else None."""
+    """The exit status if a signal has stopped compiled code, whose caller receives a SystemError; None for
+    other errors."""
     cause = error.__cause__ if isinstance(error, SystemError) else None
     if isinstance(cause, KeyboardInterrupt):
         return 128 + signal.SIGINT
     return cause.code if isinstance(cause, SystemExit) and isinstance(cause.code, int) else None
 
 
-REPEATED_S = 0.01
+REPEATED_S = 0.01  # time after which a lost signal is repeated
 
 
 def repeat(number: int) -> None:
-    """Repeat a signal whose exception arrived where Python ignores exceptions, as in a callback of an
-    import's lock. From a thread and a little later: at once it would arrive there, and be lost again.
-    """
+    """Repeat a signal whose exception was raised where Python ignores exceptions, for example in a callback
+    of an import's lock. A thread repeats it REPEATED_S later: at once, it would be lost again there."""
     threading.Timer(REPEATED_S, os.kill, [os.getpid(), number]).start()
 
 
 def _discard_stdout() -> None:
-    """Keep the interpreter from failing over the same stream once more when it ends."""
+    """Replace standard output by the null device, which the interpreter can flush at its end."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def address(option: str, given: str) -> tuple[str, int]:
-    """Host and port of HOST:PORT, as an option has it."""
+    """Host and port of the text HOST:PORT. option: its name, for the message of BadInput."""
     host, _, port = given.rpartition(":")
     if not host or not re.fullmatch("[0-9]{1,5}", port) or not 0 < int(port) < 65536:
         raise BadInput(f"{option}: {given!r} is no address, allowed: HOST:PORT with a port of 1 to 65535")
@@ -197,7 +201,8 @@ def address(option: str, given: str) -> tuple[str, int]:
 
 
 def load_all(names: list[str]) -> list["Scenario"]:
-    """The scenarios of these files or built-in names. Raises BadInput with every mistake in all of them."""
+    """The scenarios of these files or built-in names. Raises BadInput with a line for each mistake in any of
+    them."""
     from beaver_ftc.scenario.schema import load_scenario
 
     loaded: list[Scenario] = []
@@ -217,9 +222,8 @@ def load_all(names: list[str]) -> list["Scenario"]:
 
 
 def check_flyable(scenario: "Scenario", name: str) -> None:
-    """Raise BadInput, in the form of any other mistake in a file, if the flight cannot be trimmed.
-
-    The trim is kept: the flight does not search for it again."""
+    """Raise BadInput, with the line of `initial` in the file, if the flight cannot be trimmed. The trim that
+    is found is kept for the flight."""
     from beaver_ftc.documents.validation import parse_document
     from beaver_ftc.plant.conditions import find_trim
     from beaver_ftc.scenario.builtin import read_file, resolve

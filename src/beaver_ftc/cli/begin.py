@@ -1,4 +1,4 @@
-"""Where the installed command begins: Ctrl-C ends it without a traceback, while it imports too."""
+"""The start of the installed command: Ctrl-C ends it without a traceback, also during its imports."""
 
 import atexit
 import gc
@@ -9,13 +9,13 @@ from typing import Any, NoReturn
 
 from beaver_ftc.cli import repeat
 
-# Containers made before the collector looks for cycles; with Python's 700 it looks through all that is
-# imported again and again: a tenth of the time of a short command, for a few megabytes.
+# New containers after which the garbage collector runs. With Python's default of 700, it examines the imports
+# many times, which takes a tenth of the time of a short command and saves a few megabytes.
 COLLECTED_EVERY = 50_000
 
 
 def repeat_interrupt(lost: Any) -> None:
-    """Repeat Ctrl-C; say what else is ignored."""
+    """Repeat a Ctrl-C that Python ignores; report any other exception that it ignores."""
     if issubclass(lost.exc_type, KeyboardInterrupt):
         repeat(signal.SIGINT)
     else:
@@ -23,10 +23,10 @@ def repeat_interrupt(lost: Any) -> None:
 
 
 def main() -> NoReturn:
-    """Run the command line. With one thread for linear algebra, unless the environment says otherwise: of
-    small matrices threads wait for one another, and sums in another order have other last digits."""
+    """Run the command line, with one thread for linear algebra unless the environment sets another number.
+    With small matrices, threads wait for one another, and sums in another order have other last digits."""
     gc.set_threshold(COLLECTED_EVERY, 20, 100)
-    atexit.register(gc.freeze)  # a process that ends would look for cycles among all that it has
+    atexit.register(gc.freeze)  # otherwise the collector examines all objects when the process ends
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     sys.unraisablehook = repeat_interrupt
     try:

@@ -1,4 +1,4 @@
-"""`beaver-ftc list`, `show` and `schema`: what there is to choose from, and what a file may say."""
+"""`beaver-ftc list`, `show` and `schema`: the built-in choices, their files, and the JSON Schemas."""
 
 from collections.abc import Iterable, Iterator
 from textwrap import fill, indent
@@ -39,7 +39,7 @@ def list_choices(
 
 
 def _available() -> dict[str, Entries]:
-    """Kind -> entries, each a name and a description."""
+    """The lists by kind; an entry has a name and a description."""
     from beaver_ftc.plugins import DETECTORS, LAWS
     from beaver_ftc.scenario.builtin import described
 
@@ -54,13 +54,14 @@ def _available() -> dict[str, Entries]:
         "signals": _signals(),
     }
     return {
-        kind: [{"name": name, "description": says} for name, says in entries]
+        kind: [{"name": name, "description": description} for name, description in entries]
         for kind, entries in available.items()
     }
 
 
 def _aircraft() -> Iterator[tuple[str, str]]:
-    """The built-in aircraft, those that are imported or can be, and those of the jsbsim package."""
+    """The built-in aircraft, the imported ones and those that can be imported, and those of the jsbsim
+    package."""
     from beaver_ftc.aircraft import builtin_names, load
     from beaver_ftc.aircraft.aircraft import FILE, IMPORTED, imported_folder, is_derived
     from beaver_ftc.plant.instrumented import names
@@ -76,7 +77,7 @@ def _aircraft() -> Iterator[tuple[str, str]]:
 
 
 def _registered(group: str) -> Iterator[tuple[str, str]]:
-    """The detectors or laws that a scenario may name, those of other installed packages included."""
+    """The detectors or laws that a scenario may name, also those of other installed packages."""
     from beaver_ftc.plugins import OURS, registered
 
     for entry in registered(group).values():
@@ -87,12 +88,13 @@ def _faults() -> Iterator[tuple[str, str]]:
     """The fault types: of actuators, then of sensors."""
     from beaver_ftc.scenario.faults import SENSOR_TYPES, TYPES
 
-    for types, of in ((TYPES, ""), (SENSOR_TYPES, "of a sensor: ")):
-        for name, row in sorted(types.items(), key=lambda each: each[1].__name__):
-            yield name, of + _first_paragraph(row)
+    for types, beginning in ((TYPES, ""), (SENSOR_TYPES, "of a sensor: ")):
+        for name, row in sorted(types.items(), key=lambda name_and_row: name_and_row[1].__name__):
+            yield name, beginning + _first_paragraph(row)
 
 
 def _signals() -> Iterator[tuple[str, str]]:
+    """The reference signals."""
     from beaver_ftc.scenario.signals import Signal
 
     for name, shape in Signal.model_fields.items():
@@ -105,12 +107,14 @@ def _first_paragraph(described: type) -> str:
 
 
 def _section(kind: str, entries: Entries) -> str:
+    """A list with descriptions, as text."""
     width = max((len(entry["name"]) for entry in entries), default=0)
     lines = (f"  {entry['name']:{width}}  {entry['description']}".rstrip() for entry in entries)
     return "\n".join((kind, *lines))
 
 
 def _names(kind: str, entries: Entries) -> str:
+    """A list of names, as text."""
     names = fill(", ".join(entry["name"] for entry in entries), WIDTH, break_on_hyphens=False)
     return f"{kind}\n{indent(names, '  ')}"
 
@@ -133,10 +137,9 @@ def show(
     kinds = {"scenario": builtin_names(), "sweep": builtin_sweeps(), "plan": builtin_plans()}
     kind = next((kind for kind, names in kinds.items() if name in names), None)
     if kind is None:
-        known = [each for names in kinds.values() for each in names]
+        known = [choice for names in kinds.values() for choice in names]
         raise BadInput(f"show: no built-in scenario, sweep or plan {name[:100]!r}{suggestion(name, known)}")
-    path = resolve(name, kind)
-    emit(path.read_text(encoding="utf-8"))
+    emit(resolve(name, kind).read_text(encoding="utf-8"))
 
 
 @declare(plugins=False)

@@ -100,12 +100,13 @@ def command(options: Options) -> None:
 
 
 def _refuse_contradictions(options: Options, folder: Path | None) -> None:
-    ways = (options.runs, options.sweep is not None, options.benchmark, options.tune, folder is not None)
-    if sum(map(bool, ways)) != 1:
+    """Raise BadInput unless exactly one kind of comparison is chosen, and each option belongs to it."""
+    kinds = (options.runs, options.sweep is not None, options.benchmark, options.tune, folder is not None)
+    if sum(map(bool, kinds)) != 1:
         raise BadInput(
             "compare: allowed: exactly one of RUN..., --sweep FILE, --benchmark, --tune, --flights FOLDER"
         )
-    for option, with_it, allowed in (
+    for is_given, is_allowed, message in (
         (options.only is not None, options.benchmark, "--set: allowed: only with --benchmark"),
         (options.grade is not None, options.tune, "--grade: allowed: only with --tune"),
         (options.trials != Options.trials, options.tune, "--trials: allowed: only with --tune"),
@@ -120,12 +121,12 @@ def _refuse_contradictions(options: Options, folder: Path | None) -> None:
         ),
         (options.other_days, folder is not None, "--other-days: allowed: only with --flights FOLDER"),
     ):
-        if option and not with_it:
-            raise BadInput(f"compare: {allowed}")
+        if is_given and not is_allowed:
+            raise BadInput(f"compare: {message}")
 
 
 def _most_or_folder(flights: str | None) -> tuple[int | None, Path | None]:
-    """A number of flights, or the folder of recorded ones."""
+    """The number of flights, or the folder of recorded flights, that the option --flights gives."""
     if flights is None:
         return None, None
     if not re.fullmatch(r"-?[0-9]{1,9}", flights):
@@ -136,6 +137,7 @@ def _most_or_folder(flights: str | None) -> tuple[int | None, Path | None]:
 
 
 def _compare_runs(folders: list[Path], out: Path, format: Format) -> None:
+    """Compare finished runs, and print the comparison."""
     from beaver_ftc.studies.compare.runs import as_text, labels, write_runs
 
     runs = write_runs(out, folders)
@@ -144,7 +146,7 @@ def _compare_runs(folders: list[Path], out: Path, format: Format) -> None:
 
 
 def _compare_on_flights(options: Options, most: int | None) -> None:
-    """Schemes and laws on the flights of a sweep, or of the standard sets."""
+    """Compare schemes and laws on the flights of a sweep, or of the standard sets, and print the result."""
     from beaver_ftc.studies.compare.leaderboard import as_text, comparison_study, write_leaderboard
     from beaver_ftc.studies.compare.trial import LAW, SCHEME, entries_of, of_set, of_sweep, set_names
     from beaver_ftc.studies.compare.tune import read_tuned
@@ -156,7 +158,7 @@ def _compare_on_flights(options: Options, most: int | None) -> None:
         name = cases[0].set
     else:
         sets = [options.only] if options.only else set_names()
-        cases = [case for each in sets for case in of_set(each, most)]
+        cases = [case for set_name in sets for case in of_set(set_name, most)]
         name = f"benchmark-{options.only}" if options.only else "benchmark"
     chosen = None if options.tuned is None else read_tuned(options.tuned)
     entries = entries_of(
@@ -173,15 +175,15 @@ def _compare_on_flights(options: Options, most: int | None) -> None:
 
 
 def _group(option: str) -> str:
-    """The plug-ins that an option names."""
+    """The group of plug-ins whose names an option lists."""
     from beaver_ftc.plugins import DETECTORS, LAWS
 
     return DETECTORS if option == "--schemes" else LAWS
 
 
 def _chosen(option: str, names: str | None, ours: str, *, alone: bool) -> list[str]:
-    """The names listed, ours among them; without a list all that are registered, or none where the list of
-    the other kind is what was asked for (alone: it was not)."""
+    """The listed names, after `ours`. Without a list: all registered names, or none if the other option has
+    a list (`alone` is then false)."""
     from beaver_ftc.plugins import registered
 
     if names is None:
@@ -190,17 +192,18 @@ def _chosen(option: str, names: str | None, ours: str, *, alone: bool) -> list[s
 
 
 def _named(option: str, names: str | None) -> list[str]:
-    """The schemes or laws listed. Raises BadInput with a line a name that is not registered."""
+    """The listed schemes or laws. Raises BadInput with a line for each name that is not registered."""
     from beaver_ftc.plugins import refusal
 
-    given = [] if names is None else listed(names)
-    wrong = [f"{option}: {says}" for name in given if (says := refusal(_group(option), name))]
-    if wrong:
-        raise BadInput("\n".join(wrong))
-    return given
+    entries = [] if names is None else listed(names)
+    mistakes = [f"{option}: {text}" for name in entries if (text := refusal(_group(option), name))]
+    if mistakes:
+        raise BadInput("\n".join(mistakes))
+    return entries
 
 
 def _tune(options: Options, most: int | None) -> None:
+    """Search parameters of schemes and laws, write them, and print them."""
     from beaver_ftc.plugins import DETECTORS, LAWS, registered
     from beaver_ftc.studies.compare.trial import STATISTICAL
     from beaver_ftc.studies.compare.tune import Search, as_text, methods_of, tune, write_tuned
@@ -218,11 +221,12 @@ def _tune(options: Options, most: int | None) -> None:
     answer(options.format, document, lambda: f"{as_text(document)}\n\nwritten: {path}")
 
 
-def _grades(given: str | None) -> list[str]:
+def _grades(grade: str | None) -> list[str]:
+    """The grade of flights that the option gives; all grades without it."""
     from beaver_ftc.diagnosis.rivals import FLIGHT_GRADES
 
-    if given is None:
+    if grade is None:
         return list(FLIGHT_GRADES)
-    if given not in FLIGHT_GRADES:
-        raise BadInput(f"compare: --grade {given[:50]!r}, allowed: {', '.join(FLIGHT_GRADES)}")
-    return [given]
+    if grade not in FLIGHT_GRADES:
+        raise BadInput(f"compare: --grade {grade[:50]!r}, allowed: {', '.join(FLIGHT_GRADES)}")
+    return [grade]

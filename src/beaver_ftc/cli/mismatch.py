@@ -1,4 +1,4 @@
-"""`beaver-ftc mismatch`: where truth and design model differ, and what that costs the diagnosis."""
+"""`beaver-ftc mismatch`: the model error by source, and the bound that it requires."""
 
 import sys
 from collections.abc import Callable
@@ -26,7 +26,8 @@ if TYPE_CHECKING:
 
     from beaver_ftc.scenario.schema import Scenario
 
-Say = Callable[[str], None]
+Show = Callable[[str], None]
+"""Prints a text, or nothing if the answer is a JSON document."""
 
 
 @declare("mismatch.json", "mismatch.csv", "mismatch.parquet")
@@ -61,37 +62,39 @@ def command(
     from beaver_ftc.studies.mismatch.study import refuse_other_aircraft
 
     try:
-        flown = [each for scenario in load_all(scenarios) for each in _variants(scenario, variant)]
+        flown = [flight for scenario in load_all(scenarios) for flight in _variants(scenario, variant)]
     except BadInput as error:
         if format is Format.json:
             emit_json({"runs": [], "errors": str(error).splitlines()})
         raise
     refuse_other_aircraft(flown)
     report = not no_report
-    say: Say = emit if format is Format.text else lambda text: None  # the document says it
-    found = [_split(scenario, out, report, say) for scenario in flown]
-    documents = [document for document, _ in found]
+    show: Show = emit if format is Format.text else lambda text: None
+    results = [_split(scenario, out, report, show) for scenario in flown]
+    documents = [document for document, _ in results]
     several = len(flown) > 1
-    recommended = _compare(flown, found, out, report, say) if several else {}
+    recommended = _compare(flown, results, out, report, show) if several else {}
     for scenario, document in zip(flown, documents if map else (), strict=False):
-        document["map"] = _map(scenario, out, report, say)
+        document["map"] = _map(scenario, out, report, show)
     if format is Format.json:
         emit_json({"runs": documents} | recommended if several else documents[0])
 
 
 def _variants(scenario: "Scenario", text: str) -> list["Scenario"]:
+    """The scenario with each of the design models that the option --variant lists; without it, the scenario
+    alone."""
     from beaver_ftc.studies.mismatch.study import variant_of
 
-    wanted = [scenario] if not text else [variant_of(scenario, each.strip()) for each in text.split(",")]
-    names = [each.name for each in wanted]
+    variants = [variant_of(scenario, name.strip()) for name in text.split(",")] if text else [scenario]
+    names = [flight.name for flight in variants]
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice:
         raise BadInput(f"--variant {text}: {twice} comes twice, allowed: each variant once")
-    return wanted
+    return variants
 
 
-def _split(scenario: "Scenario", out: Path, report: bool, say: Say) -> tuple[Document, "np.ndarray"]:
-    """Fly and split one: its document, and the constant bound that it needs."""
+def _split(scenario: "Scenario", out: Path, report: bool, show: Show) -> tuple[Document, "np.ndarray"]:
+    """Fly a scenario and split its model error: the document, and the constant bound that it requires."""
     from beaver_ftc.studies.mismatch.study import run_mismatch
     from beaver_ftc.studies.mismatch.tables import mismatch_text
 
@@ -100,29 +103,36 @@ def _split(scenario: "Scenario", out: Path, report: bool, say: Say) -> tuple[Doc
     with progress_bar(scenario.name) as progress:
         document, needed = run_mismatch(scenario, out, report, progress)
     folder = str(out / scenario.name)
-    say(mismatch_text(document, folder, sys.stdout.isatty()))
+    show(mismatch_text(document, folder, sys.stdout.isatty()))
     return document | {"folder": folder}, needed
 
 
 def _compare(
-    scenarios: list["Scenario"], found: list[tuple[Document, "np.ndarray"]], out: Path, report: bool, say: Say
+    scenarios: list["Scenario"],
+    results: list[tuple[Document, "np.ndarray"]],
+    out: Path,
+    report: bool,
+    show: Show,
 ) -> Document:
+    """Write the comparison of several flights, and print it. Returns the document of `recommended_for`.
+    results: of `_split`."""
     from beaver_ftc.studies.mismatch.bound import recommended_for
     from beaver_ftc.studies.mismatch.study import entry, write_comparison
     from beaver_ftc.studies.mismatch.tables import comparison_text
 
-    entries = [entry(document) for document, _ in found]
-    recommended = recommended_for(scenarios, [needed for _, needed in found])
+    entries = [entry(document) for document, _ in results]
+    recommended = recommended_for(scenarios, [needed for _, needed in results])
     folder = write_comparison(out, entries, recommended, report)
-    say(comparison_text(entries, recommended, str(folder), sys.stdout.isatty()))
+    show(comparison_text(entries, recommended, str(folder), sys.stdout.isatty()))
     return recommended
 
 
-def _map(scenario: "Scenario", out: Path, report: bool, say: Say) -> list[Document]:
+def _map(scenario: "Scenario", out: Path, report: bool, show: Show) -> list[Document]:
+    """The map of the model error over airspeed and altitude; prints the path of its folder."""
     from beaver_ftc.studies.engine.study import run_into
     from beaver_ftc.studies.mismatch.study import map_study
 
     with progress_bar(f"{scenario.name}: envelope") as progress:
-        found = run_into(map_study(scenario, report), out, progress=progress)
-    say(f"map          {found['folder']}")
-    return found["map"]
+        document = run_into(map_study(scenario, report), out, progress=progress)
+    show(f"map          {document['folder']}")
+    return document["map"]

@@ -1,9 +1,8 @@
-"""`beaver-ftc run`: fly scenarios, keep the results, say the verdict."""
+"""`beaver-ftc run`: fly scenarios, write their results and print their verdicts."""
 
 import sys
 import time
 from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import partial
@@ -39,7 +38,7 @@ if TYPE_CHECKING:
     from beaver_ftc.scenario.schema import Scenario
 
     Prepare = Callable[[Plant], None]
-    Drawn = tuple[Painters, Sequence[str]]  # by whom the figures are drawn, and their formats
+    Drawn = tuple[Painters, Sequence[str]]  # the processes that draw the figures, and the formats
 
 
 FORMATS = ("png", "pdf", "svg")  # of figures
@@ -90,36 +89,31 @@ def command(options: Options) -> None:
             emit_json({"passed": False, "runs": [], "errors": str(error).splitlines()})
         write_junit([Judged("scenarios", error=str(error))], options.junit)
         raise
-    with _painters(not options.no_report) as at_work:
-        status = _run_all(loaded, options, (at_work, formats))
+    if options.no_report:
+        raise typer.Exit(_run_all(loaded, options, ((), formats)))
+    from beaver_ftc.results.painters import painters
+
+    with painters() as connections:
+        status = _run_all(loaded, options, (connections, formats))
     raise typer.Exit(status)
 
 
-def _painters(wanted: bool) -> "AbstractContextManager[Painters]":
-    """Processes that draw the figures meanwhile, where they are wanted."""
-    if not wanted:
-        return nullcontext(())
-    from beaver_ftc.results.painters import painters
-
-    return painters()
-
-
-def _formats(given: str) -> tuple[str, ...]:
+def _formats(text: str) -> tuple[str, ...]:
     """The formats of the figures, each once."""
-    named = tuple(dict.fromkeys(name.strip() for name in given.split(",")))
-    for name in named:
+    names = tuple(dict.fromkeys(name.strip() for name in text.split(",")))
+    for name in names:
         if name not in FORMATS:
             raise BadInput(f"--figures: {name!r:.60} is no format, allowed: {', '.join(FORMATS)}")
-    return named
+    return names
 
 
-def _shown(given: str | None) -> "Prepare | None":
-    """What connects a plant to the FlightGear at HOST:PORT."""
+def _connection_to_flightgear(host_and_port: str | None) -> "Prepare | None":
+    """The function that connects a plant to the FlightGear at this address; None without an address."""
     import socket
 
-    if given is None:
+    if host_and_port is None:
         return None
-    host, port = address("--flightgear", given)
+    host, port = address("--flightgear", host_and_port)
     try:
         socket.getaddrinfo(host, port, socket.AF_INET, socket.SOCK_DGRAM)
     except (OSError, UnicodeError):
@@ -128,11 +122,11 @@ def _shown(given: str | None) -> "Prepare | None":
 
 
 def _run_all(scenarios: list["Scenario"], options: Options, drawn: "Drawn") -> int:
-    """Fly one after the other; one that fails does not stop the rest. Returns the worst exit status."""
+    """Fly the scenarios one after the other, also after one that fails. Returns the largest exit status."""
     from beaver_ftc.results.model import Judged, Metrics
     from beaver_ftc.results.verdict import verdict_text
 
-    prepare = _shown(options.flightgear)
+    prepare = _connection_to_flightgear(options.flightgear)
     runs, judged, status = [], [], 0
     for scenario in scenarios:
         began = time.perf_counter()
@@ -145,12 +139,13 @@ def _run_all(scenarios: list["Scenario"], options: Options, drawn: "Drawn") -> i
             runs.append({"scenario": scenario.name, "error": str(failure)})
             judged.append(Judged(scenario.name, error=str(failure), took_s=took_s))
             continue
-        took_s, found = time.perf_counter() - began, Metrics.of(document)
+        took_s = time.perf_counter() - began
+        metrics = Metrics.of(document)
         runs.append(document)
-        judged.append(replace(found.judged, took_s=took_s))
-        status = max(status, 0 if found.passed else 1)
+        judged.append(replace(metrics.judged, took_s=took_s))
+        status = max(status, 0 if metrics.passed else 1)
         if options.format is Format.text:
-            emit(verdict_text(found, document["folder"], colour=sys.stdout.isatty()))
+            emit(verdict_text(metrics, document["folder"], colour=sys.stdout.isatty()))
     write_junit(judged, options.junit)
     if options.format is Format.json:
         first = runs[0] if len(runs) == 1 else {}
@@ -159,6 +154,8 @@ def _run_all(scenarios: list["Scenario"], options: Options, drawn: "Drawn") -> i
 
 
 def _run_one(scenario: "Scenario", options: Options, prepare: "Prepare | None", drawn: "Drawn") -> Document:
+    """Fly a scenario and write its result folder. Returns the metrics, with `folder` and the counts of the
+    certificate."""
     from beaver_ftc.results.writer import run
 
     for warning in scenario.warnings():
@@ -176,7 +173,7 @@ def _run_one(scenario: "Scenario", options: Options, prepare: "Prepare | None", 
 
 
 def _certificate(folder: Path) -> Document:
-    """How much of the flight its certificate states."""
+    """The numbers of statements, and of decisions without one, in the certificate of a result folder."""
     import json
 
     from beaver_ftc.results.writer import CERTIFICATE_FILE

@@ -1,4 +1,4 @@
-"""Scenario files before they fly: `beaver-ftc new` to begin with one, `validate` to say what is wrong."""
+"""Files before they fly: `beaver-ftc new` writes a scenario or sample logs, `validate` prints mistakes."""
 
 import re
 from pathlib import Path
@@ -20,7 +20,7 @@ from beaver_ftc.commands import declare
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.plugins import required
 
-_NAME = re.compile(r"[A-Za-z0-9_-]{1,100}")  # as of a scenario
+_NAME = re.compile(r"[A-Za-z0-9_-]{1,100}")  # of a scenario
 _NAME_LINE = re.compile(r"^name:.*$", re.MULTILINE)
 
 TEMPLATE = """\
@@ -68,6 +68,7 @@ def validate(
 
 
 def _check(file: str) -> Document:
+    """The report on a file: whether it is valid, its errors and warnings."""
     from beaver_ftc.scenario.builtin import has_key, is_sweep
     from beaver_ftc.scenario.schema import load_scenario
 
@@ -117,14 +118,15 @@ def new(
         return
     text = TEMPLATE.format(name=name) if like is None else _renamed(like, name)
     if out.suffix in (".yaml", ".yml") and not out.is_dir():
-        says = f"{str(out)!r} is a file's name, allowed: a folder; the file in it is {name}.yaml"
-        raise BadInput(f"new: --out: {says}")
+        text = f"{str(out)!r} is a file's name, allowed: a folder; the file in it is {name}.yaml"
+        raise BadInput(f"new: --out: {text}")
     path = out / f"{name}.yaml"
     _write(path, text)
     emit(f"{path}: written; fly it with `beaver-ftc run {path}`")
 
 
 def _sample_logs(folder: Path, like: str | None) -> None:
+    """Write the sample logs into a folder. like: the option, which --log excludes."""
     if like is not None:
         raise BadInput("new: --like and --log are given, allowed: one of them")
     for name, text in required("sample_logs", "new --log")().items():
@@ -133,6 +135,7 @@ def _sample_logs(folder: Path, like: str | None) -> None:
 
 
 def _renamed(like: str, name: str) -> str:
+    """The text of a built-in scenario, with another name."""
     from beaver_ftc.scenario.builtin import builtin_names, builtin_path, no_such
 
     if like not in builtin_names():
@@ -141,6 +144,7 @@ def _renamed(like: str, name: str) -> str:
 
 
 def _write(path: Path, text: str) -> None:
+    """Write a new file. Raises BadInput if it exists."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with path.open("x", encoding="utf-8") as file:

@@ -1,4 +1,4 @@
-"""`beaver-ftc sweep`: fly many flights, keep one row each, say what they show."""
+"""`beaver-ftc sweep`: fly many variations of a scenario, write a row for each flight, and summarise them."""
 
 import signal
 import sys
@@ -29,10 +29,10 @@ if TYPE_CHECKING:
     from beaver_ftc.studies.sweep.campaign import Options
     from beaver_ftc.studies.sweep.one_flight import Keep
 
-LANDS_S = 1.0  # of flights in the air, once the sweep is told to stop
+LANDS_S = 1.0  # time for which flights continue after the sweep was asked to stop
 
-Backend = StrEnum("Backend", ["local", "ray"])  # who flies
-Objective = StrEnum("Objective", ["delay", "false_alarm", "tracking"])  # what a search looks for
+Backend = StrEnum("Backend", ["local", "ray"])  # where the flights run
+Objective = StrEnum("Objective", ["delay", "false_alarm", "tracking"])  # of a search
 
 
 @dataclass(frozen=True)
@@ -94,9 +94,9 @@ def command(arguments: Arguments) -> None:
 
     def fly() -> "Judged":
         sweep = load_sweep(arguments.file)
-        if wrong := {run for run in options.keep.runs if not 0 <= run < sweep.flights}:
-            says = f"there is no flight {min(wrong)}, allowed: 0 to {sweep.flights - 1}"
-            raise BadInput(f"--keep-logs: {says}")
+        if unknown := {run for run in options.keep.runs if not 0 <= run < sweep.flights}:
+            text = f"there is no flight {min(unknown)}, allowed: 0 to {sweep.flights - 1}"
+            raise BadInput(f"--keep-logs: {text}")
         return _fly(sweep, options, format) if replay is None else _replay(sweep, options, replay, format)
 
     judged(arguments.file, format, arguments.junit, fly)
@@ -106,16 +106,17 @@ _NOT_WITH_RARE = ("search", "replay", "junit", "ray_address", "backend", "keep_l
 
 
 def _rare(sweep: "Sweep", arguments: Arguments) -> None:
-    """Estimate the probability that an expectation is not met, with its interval."""
+    """Estimate the probability that an expectation is not met, with its interval, and print it. Raises
+    BadInput for an option that this estimate does not use."""
     from beaver_ftc.cli.progress import progress_lines
     from beaver_ftc.studies.engine.processes import cores
     from beaver_ftc.studies.engine.study import run_into
     from beaver_ftc.studies.sweep.rare import as_text, rare_study
 
-    usual = Arguments(arguments.file)
-    given = [name for name in _NOT_WITH_RARE if getattr(arguments, name) != getattr(usual, name)]
-    if given:
-        raise BadInput(f"--rare and --{given[0].replace('_', '-')} exclude each other, allowed: one of them")
+    defaults = Arguments(arguments.file)
+    unused = [name for name in _NOT_WITH_RARE if getattr(arguments, name) != getattr(defaults, name)]
+    if unused:
+        raise BadInput(f"--rare and --{unused[0].replace('_', '-')} exclude each other, allowed: one of them")
     with progress_lines() as write_line:
         study = rare_study(sweep, str(arguments.rare), write_line)
         document = run_into(study, arguments.out, arguments.workers or cores())
@@ -123,6 +124,7 @@ def _rare(sweep: "Sweep", arguments: Arguments) -> None:
 
 
 def _options(arguments: Arguments) -> "Options":
+    """The options of the campaign."""
     from beaver_ftc.studies.sweep.campaign import Options
 
     return Options(
@@ -138,7 +140,9 @@ def _options(arguments: Arguments) -> "Options":
     )
 
 
-def _keep(flights: str, certified: bool = False) -> "Keep":
+def _keep(flights: str, certified: bool) -> "Keep":
+    """The flights that keep a result folder. flights: a policy, or indices with commas between them.
+    certified: with a certificate; the policy `none` is then `worst`."""
     from beaver_ftc.studies.sweep.one_flight import KEEP_POLICIES, Keep
 
     if flights in KEEP_POLICIES:
@@ -153,6 +157,7 @@ def _keep(flights: str, certified: bool = False) -> "Keep":
 
 
 def _fly(sweep: "Sweep", options: "Options", format: Format) -> "Judged":
+    """Fly a sweep, print its summary, and return its verdict."""
     from beaver_ftc.cli.progress import sweep_progress
     from beaver_ftc.studies.sweep.campaign import named_for, run_sweep
     from beaver_ftc.studies.sweep.summary_page import summary_text, verdict
@@ -165,20 +170,21 @@ def _fly(sweep: "Sweep", options: "Options", format: Format) -> "Judged":
 
 
 def _replay(sweep: "Sweep", options: "Options", index: int, format: Format) -> "Judged":
+    """Fly one flight of a sweep again, print its verdict, and return it."""
     from beaver_ftc.results.model import Metrics
     from beaver_ftc.results.verdict import verdict_text
     from beaver_ftc.studies.sweep.campaign import replay
 
     document = replay(sweep, options, index)
-    folder, found = document["folder"], Metrics.of(document)
-    answer(format, document, lambda: verdict_text(found, folder, sys.stdout.isatty()))
-    return found.judged
+    metrics = Metrics.of(document)
+    answer(format, document, lambda: verdict_text(metrics, document["folder"], sys.stdout.isatty()))
+    return metrics.judged
 
 
 @contextmanager
 def _stoppable() -> Iterator[Callable[[], bool]]:
-    """Let Ctrl-C (or SIGTERM) end the sweep once what is in the air has landed, LANDS_S later at the latest;
-    a second one ends it at once."""
+    """Yield the function that returns whether Ctrl-C or SIGTERM has asked the sweep to stop. The sweep then
+    ends when its present flights have landed, or after LANDS_S; a second signal ends it at once."""
     signals: list[int] = []
 
     def stop(number: int, frame: Any) -> None:

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 _RESIDUALS = ("udot_mps2", "vdot_mps2", "wdot_mps2", "pdot_rad_s2", "qdot_rad_s2", "rdot_rad_s2")
 _CONDITION = (("airspeed", "airspeed_mps", "m/s"), ("altitude", "altitude_m", "m"))
-_ATTITUDE = (  # what, attribute, unit; angles in degrees
+_ATTITUDE = (  # name in the table, attribute of the trim point in rad, printed unit
     ("angle of attack", "alpha_rad", "deg"),
     ("sideslip", "beta_rad", "deg"),
     ("pitch attitude", "theta_rad", "deg"),
@@ -25,7 +25,7 @@ ConditionOf = Annotated[str | None, typer.Argument(metavar="SCENARIO")]
 
 @dataclass(frozen=True)
 class Condition:
-    """The flight condition to trim: but for the first and the last, keys of a scenario's `initial`."""
+    """The arguments of `command`. All but `scenario` and `format` are keys of a scenario's `initial`."""
 
     scenario: ConditionOf = None
     airspeed_mps: Annotated[float | None, typer.Option(min=1, max=1000)] = None
@@ -64,6 +64,7 @@ def command(condition: Condition) -> None:
 
 
 def _table(point: "TrimPoint") -> str:
+    """The trimmed condition as text, a line for each quantity."""
     settings = tuple((name.replace("_", " "), name, "") for name in point.settings)
     surfaces = tuple((name, f"{name}_rad", "deg") for name in point.surfaces_rad)
     shown = (*_CONDITION, *settings, *_ATTITUDE, *surfaces)

@@ -43,7 +43,20 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 MIN_SHOWN_BEYOND_S = 0.1  # a shorter time without sufficient authority is not printed
+MAX_SHOWN_AUTHORITY_SHARE = 0.995  # an axis with a larger share has lost nothing worth saying
+MAX_LISTED_CANDIDATES = 4  # more surfaces are counted, not listed
+_ASSUMPTION_TEXT = {"sensors-sound": "sensors are sound (A11)"}
 Lines = Iterable[tuple[str, str]]  # name and text
+# Candidates that are no surface, in words.
+_TEXT_OF_OTHER_CANDIDATE = {
+    "damage": "damage", "unanticipated": "a fault outside the class", "unknown": "a fault outside the class",
+}  # fmt: skip
+# Words in the names of surfaces, and the part of the aircraft where such a surface is.
+_AIRCRAFT_PART_OF_SURFACE_WORD = {
+    "aileron": "wing", "flap": "wing", "spoiler": "wing", "slat": "wing", "elevon": "wing",
+    "elevator": "tail", "rudder": "tail", "stabilator": "tail", "stabilizer": "tail", "canard": "canard",
+    "throttle": "engines", "engine": "engines",
+}  # fmt: skip
 
 
 def title(metrics: Metrics) -> str:
@@ -93,7 +106,14 @@ def verdict_lines(metrics: Metrics) -> list[tuple[str, str]]:
         ),
         ("supervisor", _supervisor_text(metrics)),
         *(("changed", _change_text(change)) for change in metrics.changes),
-        ("engine power", _filled(_ENGINE_POWER_FORM, metrics.engine_power)),
+        (
+            "engine power",
+            _filled(
+                "took over pitch at {from_s}, for {in_charge_s} in all, {lowest_inhg:.1f} to "
+                "{highest_inhg:.1f} inHg",
+                metrics.engine_power,
+            ),
+        ),
         ("profile", _if_there(_profile_text, metrics.profile)),
         *(("limited", _protection_limit_text(limit)) for limit in metrics.limits),
         ("authority", _if_there(_insufficient_authority_text, metrics.authority)),
@@ -123,26 +143,6 @@ def _filled(form: str, section: Part | None, **more: str) -> str:
     return form.format(**values, **more)
 
 
-_CONDITION_FORM = (
-    "{airspeed_mps:g} m/s at {altitude_m:g} m, {flown_s}; diagnosis {scheme}{of_every_type}; law {law}"
-)
-_STATISTICAL_FORM = (
-    "{alarm}; threshold {alarm_level:.2f} σ, peak in healthy flight {closest_approach:.2f} of it"
-)
-_ENGINE_POWER_FORM = (
-    "took over pitch at {from_s}, for {in_charge_s} in all, {lowest_inhg:.1f} to {highest_inhg:.1f} inHg"
-)
-_LINK_FORM = (
-    "{protocol}, {frames} frames at {packets_hz:g} Hz{odd}; latency {latency_ms.median:.2f} ms (99th "
-    "percentile {latency_ms.p99:.2f}), interval {interval_ms.mean:.2f} ms, jitter "
-    "{interval_ms.jitter_rms:.2f} ms RMS"
-)
-_LIMIT_FORM_OF_QUANTITY = {
-    "airspeed_mps": "airspeed to {side} {value:.1f} m/s from {time_s}{until}: {because}",
-    "bank_deg": "bank to {side} {value:.0f} deg from {time_s}{until}: {because}",
-}
-
-
 def _window_text(window: Window, metrics: Metrics) -> str:
     """The alarm and the names in one window."""
     alarm = f"alarm after {_seconds_text(window.delay_s)}" if window.detected else "no alarm"
@@ -155,9 +155,6 @@ def _found_text(named: Named, metrics: Metrics, otherwise: str) -> str:
     if named.fault:
         return _named_fault_text(named, metrics)
     return _candidates_text(named.candidates) if named.candidates else otherwise
-
-
-MAX_LISTED_CANDIDATES = 4  # more surfaces are counted, not listed
 
 
 def _candidates_text(candidates: Sequence[str]) -> str:
@@ -177,17 +174,6 @@ def candidates_in_words(candidates: Sequence[str]) -> str:
     open_types = list(dict.fromkeys(kind for kinds in places.values() for kind in kinds))
     types = f"; {_open_types_text(open_types)}" if open_types else ""
     return f"still possible: {' or '.join(words) or 'nothing'}{types}"
-
-
-_TEXT_OF_OTHER_CANDIDATE = {
-    "damage": "damage", "unanticipated": "a fault outside the class", "unknown": "a fault outside the class",
-}  # fmt: skip
-# Words in the names of surfaces, and the part of the aircraft where such a surface is.
-_AIRCRAFT_PART_OF_SURFACE_WORD = {
-    "aileron": "wing", "flap": "wing", "spoiler": "wing", "slat": "wing", "elevon": "wing",
-    "elevator": "tail", "rudder": "tail", "stabilator": "tail", "stabilizer": "tail", "canard": "canard",
-    "throttle": "engines", "engine": "engines",
-}  # fmt: skip
 
 
 def _surfaces_text(names: Sequence[str]) -> str:
@@ -293,10 +279,8 @@ def _change_text(change: ChangeInFlight) -> str:
 def _condition_text(condition: FlightCondition) -> str:
     """Airspeed, altitude, time, scheme and law."""
     of_every_type = ", every fault type" if condition.fault_class == "all" else ""
-    return _filled(_CONDITION_FORM, condition, of_every_type=of_every_type)
-
-
-_ASSUMPTION_TEXT = {"sensors-sound": "sensors are sound (A11)"}
+    form = "{airspeed_mps:g} m/s at {altitude_m:g} m, {flown_s}; diagnosis {scheme}{of_every_type}; law {law}"
+    return _filled(form, condition, of_every_type=of_every_type)
 
 
 def _outside_class_text(metrics: Metrics) -> str:
@@ -364,6 +348,12 @@ def _profile_text(profile: ProfileDeviations) -> str:
     return f"largest deviation: {', '.join(deviations)}" if deviations else ""
 
 
+_LIMIT_FORM_OF_QUANTITY = {
+    "airspeed_mps": "airspeed to {side} {value:.1f} m/s from {time_s}{until}: {because}",
+    "bank_deg": "bank to {side} {value:.0f} deg from {time_s}{until}: {because}",
+}
+
+
 def _protection_limit_text(limit: ProtectionLimit) -> str:
     """A limit of the envelope protection: value, time and reason."""
     until = "" if limit.in_force else ", no longer at the end"
@@ -412,7 +402,8 @@ def _detection_text(metrics: Metrics) -> str:
 def _statistical_text(statistical: Statistical) -> str:
     """When the statistical detector alone would have raised the alarm."""
     alarm = "no alarm" if statistical.time_s is None else f"alarm at {_seconds_text(statistical.time_s)}"
-    return _filled(_STATISTICAL_FORM, statistical, alarm=alarm)
+    form = "{alarm}; threshold {alarm_level:.2f} σ, peak in healthy flight {closest_approach:.2f} of it"
+    return _filled(form, statistical, alarm=alarm)
 
 
 def _isolation_text(metrics: Metrics) -> str:
@@ -484,9 +475,6 @@ def _supervisor_text(metrics: Metrics) -> str:
     return " → ".join(changes)
 
 
-MAX_SHOWN_AUTHORITY_SHARE = 0.995  # an axis with a larger share has lost nothing worth saying
-
-
 def _insufficient_authority_text(authority: Authority) -> str:
     """For how long no deflection could hold the rate of each axis; times below MIN_SHOWN_BEYOND_S are left
     out."""
@@ -539,7 +527,13 @@ def _link_text(link: Link) -> str:
     odd = "".join(
         f", {getattr(link, name)} {words}" for name, words in _LINK_COUNT_WORDS.items() if getattr(link, name)
     )
-    return _filled(_LINK_FORM, link, odd=odd)
+    return _filled(
+        "{protocol}, {frames} frames at {packets_hz:g} Hz{odd}; latency {latency_ms.median:.2f} ms (99th "
+        "percentile {latency_ms.p99:.2f}), interval {interval_ms.mean:.2f} ms, jitter "
+        "{interval_ms.jitter_rms:.2f} ms RMS",
+        link,
+        odd=odd,
+    )
 
 
 def _span_text(begin_s: float, end_s: float | None) -> str:

@@ -1,9 +1,9 @@
-"""A challenge on the disk: what is handed out, what is hidden, what comes in.
+"""The folders of a challenge.
 
-DIR/public/       for the students: rules, practice flights, a detector and a law to begin with
-DIR/teacher/      hidden flights: sweep files with seeds that nobody has drawn before, for their owner alone
+DIR/public/       for the students: rules, practice flights, an example detector and an example law
+DIR/teacher/      hidden flights: sweep files with new random seeds, readable for their owner alone
 DIR/submissions/  NAME-1.py, NAME-2.py ...: the last one of a name counts
-DIR/grades/       what `grade` has found
+DIR/grades/       the results of `grade`
 """
 
 import hashlib
@@ -26,17 +26,19 @@ if TYPE_CHECKING:
 PUBLIC, TEACHER, SUBMISSIONS, GRADES = "public", "teacher", "submissions", "grades"
 MOST_BYTES = 64 * 1024
 PRACTICE_SEED, PRACTICE_RUNS = 1, 8
-HEALTHY_SHARE = 4  # one flight in so many has no fault
+HEALTHY_SHARE = 4  # one of so many hidden flights has no fault
 _HANDOUT = Path(__file__).with_name("handout")
 _NAME = re.compile(r"[A-Za-z0-9_-]{1,40}", re.ASCII)
 _FILE = re.compile(r"([A-Za-z0-9_-]{1,40}?)-([1-9][0-9]{0,5})\.py", re.ASCII)
-_OTHERS = 0o077
-_SEEDS = 2**40  # too many to try: the table of an aircraft's trim shows a submission what a seed has drawn
+_OTHERS = 0o077  # permissions of all but the owner
+# Smallest seed of hidden flights. A submission sees the trim, which depends on the seed, and could try all
+# smaller seeds.
+_SEEDS = 2**40
 
 
 @dataclass(frozen=True)
 class Submission:
-    """A file that was handed in; its digest tells one text from another."""
+    """A submitted file, with the SHA-256 of its content."""
 
     student: str
     file: Path
@@ -44,9 +46,10 @@ class Submission:
 
 
 def new(folder: Path, flights: int, rules: Mapping[str, float]) -> None:
-    """Write a challenge with so many hidden flights into a new or empty folder. Raises BadInput.
+    """Write a challenge with so many hidden flights into a new or empty folder. Raises BadInput for another
+    folder.
 
-    rules: limits and points that the students are told (`grading.rules`).
+    rules: limits and points in the rules for the students (`grading.rules`).
     """
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise BadInput(f"challenge new: {folder} exists, allowed: a new folder, or an empty one")
@@ -64,10 +67,11 @@ def new(folder: Path, flights: int, rules: Mapping[str, float]) -> None:
 
 
 def _public_files(rules: Mapping[str, float]) -> dict[str, str]:
-    shown = {
-        path.name.removesuffix(".txt"): path for path in _HANDOUT.iterdir() if path.suffix in (".md", ".txt")
-    }
-    texts = {name: path.read_text(encoding="utf-8") for name, path in shown.items()}
+    """The text of each file for the students, by its name."""
+    texts = {
+        path.name.removesuffix(".txt"): path.read_text(encoding="utf-8")
+        for path in _HANDOUT.iterdir() if path.suffix in (".md", ".txt")
+    }  # fmt: skip
     texts["README.md"] = texts["README.md"].format(**rules)
     for kind in ("healthy", "loss"):
         texts[f"practice-{kind}.yaml"] = _flights(kind, "practice", PRACTICE_RUNS, PRACTICE_SEED)
@@ -75,6 +79,7 @@ def _public_files(rules: Mapping[str, float]) -> dict[str, str]:
 
 
 def _flights(kind: str, name: str, runs: int, seed: int) -> str:
+    """The sweep file of so many flights. kind: `healthy` or `loss`."""
     return (_HANDOUT / f"{kind}.yaml").read_text(encoding="utf-8").format(name=name, runs=runs, seed=seed)
 
 
@@ -85,7 +90,7 @@ def _base() -> str:
 
 
 def practice() -> "Scenario":
-    """The flight that a submission is tried on."""
+    """The practice flight with which `submit` checks a submission."""
     from beaver_ftc.documents import parse_yaml as parse
     from beaver_ftc.scenario import load
 
@@ -93,8 +98,8 @@ def practice() -> "Scenario":
 
 
 def hidden_flights(challenge: Path) -> list["Scenario"]:
-    """The flights of every sweep file of the teacher's part. Raises BadInput, also if others may read it or
-    work out its seed."""
+    """The flights of all sweep files in the folder of the teacher. Raises BadInput if there is none, if
+    others or a submission may read it, or if its seed is small enough to be found."""
     from beaver_ftc.scenario import load_sweep
     from beaver_ftc.studies.compare import of_sweep
 
@@ -108,7 +113,7 @@ def hidden_flights(challenge: Path) -> list["Scenario"]:
             raise BadInput(
                 f"challenge grade: {path}: others may read it, allowed: its owner alone (chmod go= {path})"
             )
-        if any(path.resolve().is_relative_to(shown) for shown in readable()):
+        if any(path.resolve().is_relative_to(folder) for folder in readable()):
             raise BadInput(f"challenge grade: {path}: lies among Python's packages, allowed: another folder")
     for path in files:
         if load_sweep(path).file.seed < _SEEDS:
@@ -119,7 +124,8 @@ def hidden_flights(challenge: Path) -> list["Scenario"]:
 
 
 def source_of(path: Path) -> str:
-    """The text of a submission: a file, or the only one of a folder. Raises BadInput."""
+    """The text of a submission: of a file, or of the only Python file of a folder. Raises BadInput for
+    another path, a file that is too large, and one that is not UTF-8."""
     if path.is_dir() and not path.is_symlink():
         files = sorted(path.glob("*.py"))
         if len(files) != 1:
@@ -138,7 +144,8 @@ def source_of(path: Path) -> str:
 
 
 def keep(source: str, student: str, challenge: Path) -> Path:
-    """Put a submission beside those that there are, under the next number. Raises BadInput."""
+    """Write a submission with the next number of this student, and return its path. Raises BadInput if the
+    folder is no challenge."""
     folder = challenge / SUBMISSIONS
     if not folder.is_dir():
         raise BadInput(
@@ -157,7 +164,7 @@ def keep(source: str, student: str, challenge: Path) -> Path:
 
 
 def check_student(name: str) -> str:
-    """A student's name that can be a file's. Raises BadInput."""
+    """The name of a student. Raises BadInput if it cannot be the name of a file."""
     if not _NAME.fullmatch(name):
         raise BadInput(
             f"challenge submit: --student {name[:60]!r}, allowed: letters, digits, - and _, at most 40"
@@ -166,7 +173,7 @@ def check_student(name: str) -> str:
 
 
 def submissions(challenge: Path) -> list[Submission]:
-    """The last submission of each student, by name. Raises BadInput where there is none."""
+    """The last submission of each student, sorted by name. Raises BadInput if there is none."""
     last: dict[str, tuple[int, Path]] = {}
     for student, number, path in _numbered(challenge / SUBMISSIONS):
         last[student] = max(last.get(student, (0, path)), (number, path))
@@ -178,10 +185,12 @@ def submissions(challenge: Path) -> list[Submission]:
 
 
 def _numbered(folder: Path) -> Iterator[tuple[str, int, Path]]:
+    """Student, number and path of each submission."""
     for path in sorted(folder.glob("*.py")):
         if matched := _FILE.fullmatch(path.name):
             yield matched[1], int(matched[2]), path
 
 
 def _digest(path: Path) -> str:
+    """SHA-256 of a regular file; of an empty text for any other path."""
     return hashlib.sha256(path.read_bytes() if path.is_file() and not path.is_symlink() else b"").hexdigest()

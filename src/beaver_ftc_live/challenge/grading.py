@@ -1,6 +1,6 @@
-"""Submissions on the hidden flights: a row each, points, and a ranking beside the built-in ones.
+"""The grades of submissions on the hidden flights, with the built-in scheme, law and oracle in the rankings.
 
-A flight gives 0 to 100 points (`points_of_detector`, `points_of_law`), the score is their mean.
+A flight gives 0 to 100 points (`points_of_detector`, `points_of_law`); the score is their mean.
 """
 
 import hashlib
@@ -52,7 +52,7 @@ FULL, NAMED, SLOW_S = 100.0, 50.0, 5.0
 
 
 def rules() -> dict[str, float]:
-    """Limits and points, as the students are told."""
+    """Limits and points, by their names in the rules for the students."""
     times = {"load_s": line.LOAD_S, "frame_s": line.FRAME_S, "all_s": line.ALL_S}
     sizes = {"kib": folders.MOST_BYTES >> 10, "mib": confine.MEMORY_BYTES >> 20}
     return times | sizes | {"quick": FULL - NAMED, "named": NAMED, "slow_s": SLOW_S}
@@ -60,7 +60,10 @@ def rules() -> dict[str, float]:
 
 @dataclass
 class Graded:
-    """What became of a submission: its results in the order of the flights, None of a flight that it lost."""
+    """The results of a submission in the order of the flights; None for a flight that it could not complete.
+
+    walls: names of the protections of its process. reason: of its first failure. barred: without any points.
+    """
 
     student: str
     kind: str = ""
@@ -72,11 +75,12 @@ class Graded:
 
 
 def grade(challenge: Path, workers: int, progress: Progress | None) -> Document:
-    """Grade the last submission of each student; writes `grades` in the challenge's folder."""
+    """Grade the last submission of each student, and write the folder `grades` of the challenge."""
     flights = folders.hidden_flights(challenge)
-    Random(repr(flights)).shuffle(flights)  # else the number of a process tells healthy flights from others
+    # Otherwise the number of a process would show whether its flight is healthy.
+    Random(repr(flights)).shuffle(flights)
     cases = [*folders.submissions(challenge), *OURS]
-    flown = hashlib.sha256(repr(flights).encode()).hexdigest()  # what is kept on the way hides them, too
+    flown = hashlib.sha256(repr(flights).encode()).hexdigest()  # an interrupted study hides them, too
     study = Study(
         folders.GRADES, cases, partial(grade_case, flights=flights),
         partial(document_of, flights=len(flights)), FILES, row=Graded, follows_from=flown, lost=_lost,
@@ -85,11 +89,13 @@ def grade(challenge: Path, workers: int, progress: Progress | None) -> Document:
 
 
 def _lost(case: Any, why: str) -> Graded:
+    """The row of a submission whose process was lost."""
     return Graded(case.student, reason=why, barred=True)
 
 
 def tried(source: str, name: str) -> Document:
-    """What a submission makes of a practice flight. Raises BadInput with what it does wrong."""
+    """Kind, class, protections and points of a submission in the practice flight. Raises BadInput if the
+    submission fails."""
     flight, allowance = folders.practice(), Allowance()
     try:
         with SubmittedCode(source, name, allowance) as first:
@@ -106,7 +112,7 @@ def tried(source: str, name: str) -> Document:
 
 
 def grade_case(case: Submission | str, flights: Sequence["Scenario"]) -> Graded:
-    """A submission, or what is built in, on every flight."""
+    """The results of a submission, or of a built-in entry (a key of OURS), on all flights."""
     if isinstance(case, str):
         return Graded(
             case, results=[_flown(with_entry(flight, OURS[case]), OURS[case]) for flight in flights]
@@ -120,11 +126,12 @@ def grade_case(case: Submission | str, flights: Sequence["Scenario"]) -> Graded:
 
 
 def _grade(graded: Graded, source: str, name: str, flights: Sequence["Scenario"]) -> None:
+    """Load a submission and add its results to `graded`. Raises Barred if it cannot be loaded."""
     allowance = Allowance()
     try:
         with SubmittedCode(source, name, allowance) as first:
             first.look()
-    except BeaverFtcError as error:  # it cannot be loaded, and never will
+    except BeaverFtcError as error:  # it could not be loaded for any flight
         raise Barred(str(error)) from error
     graded.kind, graded.class_name, graded.walls = first.kind, first.class_name, first.walls
     for flight in flights:
@@ -140,7 +147,8 @@ def _grade(graded: Graded, source: str, name: str, flights: Sequence["Scenario"]
 def fly_submission(
     first: SubmittedCode, source: str, name: str, allowance: Allowance, flight: "Scenario"
 ) -> Result:
-    """Fly a flight with a class in a process of its own; first: what was found out about it."""
+    """Fly a flight with a submitted class in a process of its own. first: the class as it was loaded before,
+    with its kind."""
     if first.kind == "detector":
         entry = OURS[DETECTOR]
         with SubmittedDetector(source, name, allowance) as detector:
@@ -158,8 +166,13 @@ def _flown(scenario: "Scenario", entry: Entry, **plugged: Any) -> Result:
 
 
 def points_of_detector(result: Result | None) -> float:
-    """Without a fault 100 if there is no alarm. With one 0 after a false alarm or none; else 50 less in
-    proportion to the delay, nothing from 5 s on, and 50 for the right name."""
+    """Points of a detector in a flight:
+
+    failed flight, or false alarm    0
+    no fault                         FULL
+    fault without an alarm           0
+    fault with an alarm              (FULL - NAMED) max(0, 1 - delay / SLOW_S), and NAMED for the right name
+    """
     if result is None or result.false_alarm:
         return 0.0
     if not result.faulted:
@@ -170,16 +183,17 @@ def points_of_detector(result: Result | None) -> float:
 
 
 def points_of_law(result: Result | None, oracle: Result) -> float:
-    """100 times the oracle's tracking error over its own, at most 100; 0 if the aircraft is lost."""
+    """Points of a law in a flight: FULL times the tracking error of the oracle over that of the law, at most
+    FULL; 0 if the flight failed or the aircraft was lost."""
     if result is None or not isfinite(result.rms_deg_s):
         return 0.0
     return FULL * min(1.0, oracle.rms_deg_s / result.rms_deg_s)
 
 
 def document_of(rows: Sequence[Graded], flights: int) -> Document:
-    """Both rankings; numbers that do not exist are null."""
+    """The document grades.json, with both rankings. Numbers that do not exist are null."""
     yardstick = next(row.results for row in rows if row.student == ORACLE)
-    oracle = [result for result in yardstick if result is not None]  # which are all
+    oracle = [result for result in yardstick if result is not None]  # for the type: none is missing
     kinds: dict[str, Callable[[Graded], Document]] = {
         "detectors": detectors_row,
         "laws": partial(laws_row, oracle=oracle),
@@ -194,12 +208,13 @@ def document_of(rows: Sequence[Graded], flights: int) -> Document:
 
 
 def _belongs(row: Graded, kind: str, ours: str) -> bool:
-    """Whether a row is of this ranking; what could not be loaded is among the detectors."""
+    """Whether a row belongs to the ranking of this kind. A submission that could not be loaded is ranked
+    with the detectors. ours: the built-in entry of this ranking."""
     return row.student == ours or (row.student not in OURS and (row.kind or "detector").endswith(kind))
 
 
 def _ranked(rows: list[Document]) -> list[Document]:
-    """Best first; what is built in stands where it belongs and has no place of its own."""
+    """The rows with their places, the best first. A built-in entry has no place."""
     rows.sort(key=lambda row: (-row["score"], row["student"]))
     above = 0
     for row in rows:
@@ -209,12 +224,13 @@ def _ranked(rows: list[Document]) -> list[Document]:
 
 
 def _row(graded: Graded, points: Sequence[float]) -> Document:
+    """The columns of both rankings. points: of each flight."""
     score = 0.0 if graded.barred or not points else round(fmean(points), 1)
     return {"place": None, "student": graded.student, "class": graded.class_name, "score": score}
 
 
 def detectors_row(graded: Graded) -> Document:
-    """A row of the detectors' ranking, but for its place."""
+    """A row of the ranking of detectors, without its place."""
     flown = [result for result in graded.results if result is not None]
     delays = [r.delay_s for r in flown if r.faulted and not r.false_alarm and isfinite(r.delay_s)]
     return _row(graded, [points_of_detector(result) for result in graded.results]) | {
@@ -229,6 +245,7 @@ def detectors_row(graded: Graded) -> Document:
 
 
 def _reason(graded: Graded, flown: Sequence[Result]) -> str | None:
+    """The reason of a failure, or a remark on a detector with false alarms in all flights."""
     if graded.reason:
         return graded.reason
     if graded.kind == "detector" and flown and all(result.false_alarm for result in flown):
@@ -237,7 +254,7 @@ def _reason(graded: Graded, flown: Sequence[Result]) -> str | None:
 
 
 def laws_row(graded: Graded, oracle: Sequence[Result]) -> Document:
-    """A row of the laws' ranking, but for its place; oracle: its results on the same flights."""
+    """A row of the ranking of laws, without its place. oracle: its results on the same flights."""
     pairs = list(zip(graded.results, oracle, strict=False))
     flown = [(mine, best) for mine, best in pairs if mine is not None]
     ratios = [mine.rms_deg_s / best.rms_deg_s for mine, best in flown]
@@ -260,6 +277,7 @@ _COLUMNS = {
 
 
 def _table(rows: Sequence[Document]) -> Table:
+    """The table of a ranking."""
     keys = [key for key in _COLUMNS if key in rows[0]]
     cells = [[_cell(key, row[key]) for key in keys] for row in rows]
     return Table([_COLUMNS[key] for key in keys], cells)
@@ -272,7 +290,7 @@ def _cell(key: str, value: Any) -> str:
 
 
 def as_text(document: Document) -> str:
-    """For a terminal."""
+    """The text for a terminal."""
     blocks = [f"{document['flights']} hidden flights; protections: {', '.join(document['walls']) or 'none'}"]
     for name in ("detectors", "laws"):
         table = _table(document[name])
@@ -281,7 +299,7 @@ def as_text(document: Document) -> str:
 
 
 def parts_of(document: Document) -> list[Part]:
-    """For pages."""
+    """The parts of the page, for grades.md and grades.html."""
     parts: list[Part] = [f"{document['flights']} hidden flights, the same for everybody."]
     for name in ("detectors", "laws"):
         parts += [Heading(name.capitalize()), _table(document[name])]

@@ -1,4 +1,4 @@
-"""You against the detector: something breaks unseen, you name it, the diagnosis names it, times compare."""
+"""A game against the detector: a fault begins unseen; the faster right name, of player or diagnosis, wins."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -10,7 +10,7 @@ from beaver_ftc.results import DeclaredFault, Onset
 from beaver_ftc.scenario.faults import TYPES
 from beaver_ftc_live.page.messages import Message
 
-EARLIEST_S, LATEST_S = 4.0, 20.0  # of the hidden fault, after the start of the round
+EARLIEST_S, LATEST_S = 4.0, 20.0  # range of the begin of the hidden fault, from the start of the round
 IDLE, WAITING, BROKEN, OVER = "idle", "waiting", "broken", "over"
 NOTHING = "nothing"
 
@@ -19,7 +19,11 @@ Fault = dict[str, Any]  # as in a scenario, without its times
 
 @dataclass
 class Game:
-    """One round at a time; times in s of flight. score: rounds won by you and by the detector."""
+    """A round. phase: one of IDLE, WAITING (for the fault), BROKEN and OVER. mode: `random`, or `second` if
+    another person chooses the fault. due_s, broken_s: times of flight at which the fault should begin, and
+    has begun. yours, detector: name and time of the answer of the player and of the diagnosis. score: numbers
+    of rounds that the player and the detector have won.
+    """
 
     phase: str = IDLE
     mode: str = "random"
@@ -32,11 +36,11 @@ class Game:
 
     @property
     def hidden(self) -> bool:
-        """Whether the page must not show what is broken, nor what the diagnosis says."""
+        """Whether the page must hide the fault and the verdict."""
         return self.phase in (WAITING, BROKEN)
 
     def next_round(self, mode: str, now_s: float, kinds: list[Fault], rng: np.random.Generator) -> "Game":
-        """A new round; in `random` one of these faults will come at a time nobody is told."""
+        """A new round. In the mode `random`, one of these faults begins at a random time."""
         game = Game(phase=WAITING, mode=mode, score=self.score)
         if mode == "random":
             game.fault = kinds[int(rng.integers(len(kinds)))]
@@ -44,20 +48,21 @@ class Game:
         return game
 
     def is_due(self, now_s: float) -> bool:
-        """Whether the hidden fault has to come now."""
+        """Whether the hidden fault must begin now."""
         return self.phase == WAITING and now_s >= self.due_s
 
     def broke(self, fault: Fault, now_s: float) -> None:
-        """Something has been broken, by chance or by the second person."""
+        """Note a fault that has begun, in either mode."""
         self.phase, self.fault, self.broken_s = BROKEN, fault, now_s
 
     def named(self, name: str, now_s: float) -> None:
-        """The diagnosis has named a surface."""
+        """Note the first name that the diagnosis has given in this round."""
         if self.hidden and self.detector is None:
             self.detector = name, now_s
 
     def answer(self, name: str | None, names: tuple[str, ...], now_s: float) -> None:
-        """You name a surface. The first answer counts, later ones do not; before the fault it is wrong."""
+        """Note the answer of the player. Only the first answer of a round counts, and it is wrong before the
+        fault. Raises BadInput without a round, and for an unknown name."""
         if not self.hidden:
             raise BadInput("game: no round is on, allowed: start one")
         if name not in names:
@@ -66,7 +71,8 @@ class Game:
             self.yours = str(name), now_s
 
     def settle(self, wait_s: float, now_s: float) -> bool:
-        """End the round once both have spoken, or you have and the detector had its time; tells if so."""
+        """End the round if the player has answered, and if the diagnosis has named a surface, no fault has
+        begun, or wait_s has passed since the answer. Returns whether the round has ended."""
         if not self.hidden or self.yours is None:
             return False
         if self.detector is None and self.broken_s is not None and now_s < self.yours[1] + wait_s:
@@ -79,25 +85,25 @@ class Game:
 
     @property
     def winner(self) -> str | None:
-        """you, detector or nobody (None): who named the right surface first, or at all."""
-        times = {who: self._delay_s(said) for who, said in (("you", self.yours), ("detector", self.detector))}
-        right = {who: delay_s for who, delay_s in times.items() if delay_s is not None}
-        return min(right, key=lambda who: right[who]) if right else None
+        """`you` or `detector`: the one with the smaller delay of a right answer; None if neither is right."""
+        times = {"you": self._delay_s(self.yours), "detector": self._delay_s(self.detector)}
+        right = {player: delay_s for player, delay_s in times.items() if delay_s is not None}
+        return min(right, key=lambda player: right[player]) if right else None
 
-    def _delay_s(self, said: tuple[str, float] | None) -> float | None:
-        """From the fault to the right answer, s; None if it was wrong or too early."""
-        if said is None or self.broken_s is None:
+    def _delay_s(self, answer: tuple[str, float] | None) -> float | None:
+        """Time from the fault to a right answer, s; None if the answer was wrong or came before the fault."""
+        if answer is None or self.broken_s is None:
             return None
-        name, time_s = said
+        name, time_s = answer
         broken = DeclaredFault(self.fault.get("actuator"), self.fault["type"], self.broken_s)
         return Onset(self.broken_s).delay_s(time_s) if broken.is_named_by(name) else None
 
     def stop(self) -> None:
-        """Give the round up."""
+        """End the round without a winner."""
         self.phase = OVER if self.hidden else IDLE
 
     def shown(self) -> Message:
-        """What a page may know."""
+        """The game for a page; the fault and the answers only after the round."""
         phase = WAITING if self.hidden else self.phase
         always = {"phase": phase, "mode": self.mode, "answered": self.yours is not None, "score": self.score}
         if self.phase != OVER:
@@ -110,12 +116,12 @@ class Game:
 
 
 def hidden_faults(surfaces: tuple[str, ...], primary: tuple[str, ...]) -> list[Fault]:
-    """What may break unseen: what can be felt. A surface that only stands in for others is still while all is
-    well: on it only some faults show, such as a runaway."""
-    hidden = sorted((of.place, kind, of) for kind, row in TYPES.items() for of in row.hidden)
+    """The faults of a round. A surface that is not in `primary` moves only if it replaces another one: on it,
+    only faults that show without a command, such as a runaway."""
+    hidden = sorted((fault.place, kind, fault) for kind, row in TYPES.items() for fault in row.hidden)
     return [
-        {"type": kind, "actuator": surface, **of.keys}
+        {"type": kind, "actuator": surface, **fault.keys}
         for surface in surfaces
-        for _, kind, of in hidden
-        if surface in primary or of.on_any_surface
+        for _, kind, fault in hidden
+        if surface in primary or fault.on_any_surface
     ]

@@ -1,7 +1,7 @@
-"""What a page may ask of the flight, and how it is answered.
+"""The requests of a page and the messages to it.
 
-One model a request, strict and small; anything else is refused. Faults are put in words, numbers short,
-answers as JSON.
+Each request has a model with limits; any other message is refused. Messages to a page are JSON, with faults
+in words and numbers of seven digits.
 """
 
 import json
@@ -18,9 +18,9 @@ from beaver_ftc_live.page import MAX_BYTES, MAX_GUESTS
 
 FASTEST = 20.0  # times real time
 STICK_DEG_S = 20.0  # full stick
-WHEN = {"at_s", "end_s"}  # of a fault: not what it is
+WHEN = {"at_s", "end_s"}  # keys of a fault that are times
 MAX_NAME = 24  # letters
-# Letters that are blank; a mark on no letter; three on one, which stand on the line above.
+# Blank letters; a mark without a letter; three marks on a letter, which reach into the line above.
 ILLEGIBLE = re.compile(r"[\u115f\u1160\u2800\u3164\uffa0]|(^| )\0|\0{3}")
 
 Message = dict[str, Any]  # to a page
@@ -33,7 +33,7 @@ GustMps = Annotated[float, Field(ge=-25, le=25)]
 
 
 class Request(BaseModel):
-    """n: a number of the page's choice, which the answer repeats."""
+    """A request. n: a number that the page chooses and the answer repeats. do: its kind."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
@@ -42,7 +42,7 @@ class Request(BaseModel):
 
 
 class Break(Request):
-    """Break something now; the scenario's own rules check the fault."""
+    """Begin a fault now. The rules of a scenario check it."""
 
     do: Literal["break"]
     fault: dict[Name, Finite | Name] = Field(max_length=8)
@@ -63,7 +63,7 @@ class Blow(Request):
 
 
 class Aim(Request):
-    """New values for the autopilot; what is left out stays."""
+    """New commands to the autopilot. None: unchanged."""
 
     do: Literal["aim"]
     altitude_m: Finite4 | None = None
@@ -72,7 +72,8 @@ class Aim(Request):
 
 
 class Stick(Request):
-    """Rates added to the reference, deg/s, until said otherwise; coordinated: with those of a level turn."""
+    """Rates added to the reference until the next such request, deg/s. coordinated: also those of a level
+    turn."""
 
     do: Literal["stick"]
     coordinated: bool = False
@@ -80,14 +81,14 @@ class Stick(Request):
 
 
 class Speed(Request):
-    """How many times real time."""
+    """The speed of the simulation as a multiple of real time."""
 
     do: Literal["speed"]
     times: float = Field(ge=1, le=FASTEST)
 
 
 class Pause(Request):
-    """Hold the flight, or let it go on."""
+    """Pause the flight, or continue it."""
 
     do: Literal["pause"]
     on: bool
@@ -97,7 +98,7 @@ Grade = Literal["ideal", "tactical-grade", "consumer-grade"]
 
 
 class Change(Request):
-    """Another law, diagnosis or sensors now; what is left out stays."""
+    """Another law, diagnosis or sensors from now on. None: unchanged."""
 
     do: Literal["change"]
     law: Name | None = None
@@ -106,7 +107,7 @@ class Change(Request):
 
 
 class Fresh(Request):
-    """Begin a new flight from trim; what is left out stays as it was."""
+    """Begin a new flight in trim. None: as in the present flight."""
 
     do: Literal["fresh"]
     scenario: Name | None = None
@@ -119,7 +120,8 @@ class Fresh(Request):
 
 
 class Game(Request):
-    """You against the detector: random or second (someone else breaks it), an answer, or the end of it."""
+    """A move of the game against the detector: a new round with a random fault, or with one that another
+    person chooses (`second`); an answer; or the end of the round."""
 
     do: Literal["game"]
     move: Literal["random", "second", "answer", "stop"]
@@ -127,19 +129,19 @@ class Game(Request):
 
 
 class Save(Request):
-    """Write the flight so far as a result folder."""
+    """Write the flight up to now as a result folder."""
 
     do: Literal["save"]
 
 
 class Invite(Request):
-    """Ask for an address that lets another browser in, once."""
+    """Request an address with which another browser can open the page once."""
 
     do: Literal["invite"]
 
 
 class Let(Request):
-    """Let a guest break things, or all guests; or have them look on again."""
+    """Allow a guest, or all guests, to inject faults; or withdraw this."""
 
     do: Literal["let"]
     guest: int | None = Field(None, ge=1, le=MAX_GUESTS)
@@ -147,21 +149,21 @@ class Let(Request):
 
 
 def _with_marks_as_zero(name: str) -> str:
-    """The name with what stands above, below or through the letter before it as \\0."""
+    """The name with \\0 in place of each mark above, below or through the letter before it."""
     return "".join("\0" if category(letter) in ("Mn", "Me") else letter for letter in name)
 
 
 def _as_one_line(name: str) -> str:
-    """A name on one line. Letters that turn the direction of others, show as nothing, or reach into other
-    lines are none of it."""
-    one = " ".join(name.split())
-    if not one or not one.isprintable() or ILLEGIBLE.search(_with_marks_as_zero(one)):
+    """A name on one line. Raises ValueError without a letter, and for letters that change the direction of
+    others, are blank, or reach into other lines."""
+    line = " ".join(name.split())
+    if not line or not line.isprintable() or ILLEGIBLE.search(_with_marks_as_zero(line)):
         raise ValueError("letters that can be read are missing, or others are there")
-    return one
+    return line
 
 
 class CallMe(Request):
-    """What a guest is to be called."""
+    """The name of a guest."""
 
     do: Literal["name"]
     name: Annotated[str, AfterValidator(_as_one_line)] = Field(max_length=MAX_NAME)
@@ -175,7 +177,7 @@ _ADAPTER: TypeAdapter[Request] = TypeAdapter(AnyRequest)
 
 
 def parse(text: str | bytes) -> Request:
-    """The request in a message. Raises BadInput with the first thing that is wrong, in one line."""
+    """The request in a message. Raises BadInput with the first mistake, in one line."""
     if len(text) > MAX_BYTES:
         raise BadInput(f"a message of {len(text)} characters, allowed: {MAX_BYTES}")
     try:
@@ -192,10 +194,10 @@ def acknowledged(n: int, ok: bool, says: str) -> Message:
 
 
 def in_words(fault: Mapping[str, Any]) -> str:
-    """What is broken, how, and by how much."""
+    """A fault in words: its place, its type and its sizes."""
     where = fault.get("sensor", fault.get("actuator", fault["type"]))
-    unsaid = {"type", "actuator", "sensor", *WHEN}
-    sizes = ", ".join(f"{key} {value}" for key, value in fault.items() if key not in unsaid)
+    no_sizes = {"type", "actuator", "sensor", *WHEN}
+    sizes = ", ".join(f"{key} {value}" for key, value in fault.items() if key not in no_sizes)
     return f"{where}: {str(fault['type']).replace('_', ' ')}" + (f" ({sizes})" if sizes else "")
 
 
@@ -213,5 +215,5 @@ def encode(message: Message) -> bytes:
 
 
 def short(value: float) -> float | None:
-    """Seven digits are enough to draw; what is not finite is none."""
+    """A number with seven digits, which suffice to draw it; None for a number that is not finite."""
     return float(f"{value:.7g}") if isfinite(value) else None

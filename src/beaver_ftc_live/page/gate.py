@@ -1,12 +1,12 @@
-"""Who is let in, by which name, and what each may ask: a seat a link.
+"""Access to the live page: pilot and guests, their links, and what each may request.
 
-A link's token becomes a cookie, and only this server's own page may use it. Cookies know no ports: a browser
-would hand one for 127.0.0.1 to whatever else listens there. So each seat has a path that nobody else can
-know, and its cookie is bound to that: a browser may hold several seats, none opens another. The
-pilot's link works once; a guest's works again, since that guest has to come back by it.
+Each link opens a *seat*. Its token is exchanged for a cookie, which only the page of this server may use. A
+browser sends the cookies of 127.0.0.1 to every port there. Each seat therefore has a secret path, and its
+cookie is bound to this path: a browser may have several seats, and none opens another. The link of the pilot
+works once, that of a guest again, since the guest returns by it.
 
-Host and Origin are checked against the address that the server has, which keeps out pages of other ports and
-names that were made to resolve to this machine.
+Host and Origin are compared with the address of the server. This refuses pages of other ports, and names that
+resolve to this machine.
 """
 
 import secrets
@@ -22,24 +22,24 @@ from beaver_ftc.documents import BadInput
 
 COOKIE = "beaver-ftc-live"
 LOOPBACK_NAMES = ("127.0.0.1", "localhost")
-HTTP_PORT = 80  # which browsers leave out
-TOKENS_OPEN = 16  # addresses given out and not yet used
-MAX_PAGES = 20  # of the pilot
+HTTP_PORT = 80  # browsers leave this port out
+TOKENS_OPEN = 16  # largest number of links of a seat that are not used yet
+MAX_PAGES = 20  # open pages of the pilot
 MAX_PAGES_OF_A_GUEST = 3
 LOOKING_ON = frozenset({"name"})
 INVITED = LOOKING_ON | {"break", "repair", "blow"}
 MESSAGES_PER_S, BURST = 5.0, 20.0  # of a guest
-JOINS_PER_S, BURST_OF_JOINS = 0.5, 6.0  # of a guest: each makes the flight introduce itself, some 7 ms
+JOINS_PER_S, BURST_OF_JOINS = 0.5, 6.0  # new pages of a guest: each costs the flight about 7 ms
 
 
 class Allowance:
-    """So many at once, and so many a second thereafter. Times are the machine's monotonic clock, s."""
+    """A limit on events: `burst` at once, and `per_s` in a second after them. Times: monotonic clock, s."""
 
     def __init__(self, per_s: float, burst: float, now_s: float) -> None:
         self._per_s, self._burst, self._left, self._at_s = per_s, burst, burst, now_s
 
     def takes(self, now_s: float) -> bool:
-        """Whether one more is within it; it then counts."""
+        """Whether one more event is within the limit. This event is then counted."""
         self._left = min(self._burst, self._left + (now_s - self._at_s) * self._per_s)
         self._at_s = now_s
         if self._left < 1.0:
@@ -49,12 +49,12 @@ class Allowance:
 
 
 class Seat:
-    """What one link opens. number: of a guest, from 1; 0: the pilot."""
+    """The access that a link opens. number: of a guest, from 1 on; 0 for the pilot."""
 
     def __init__(self, number: int = 0) -> None:
         self.number, self.name, self.is_invited = number, "", False
-        self.room = "/" + secrets.token_urlsafe(12)  # the path that everything of it is under
-        self.pages = 0  # that are open
+        self.room = "/" + secrets.token_urlsafe(12)  # secret path of all its addresses
+        self.pages = 0  # number of open pages
         self._session = secrets.token_urlsafe(32)
         self._tokens: deque[str] = deque(maxlen=TOKENS_OPEN)
         self._used: deque[str] = deque(maxlen=TOKENS_OPEN)
@@ -63,12 +63,12 @@ class Seat:
         self._joins = Allowance(JOINS_PER_S, BURST_OF_JOINS, now_s)
 
     def token(self) -> str:
-        """A new one."""
+        """A new token."""
         self._tokens.append(secrets.token_urlsafe(24))
         return self._tokens[-1]
 
     def redeem(self, token: str) -> str | None:
-        """The cookie's value for a token of this seat that may be used, else None."""
+        """The value of the cookie for a valid token of this seat; None for any other token."""
         known = _found(token, self._tokens)
         if known is not None and not self.number:
             self._tokens.remove(known)
@@ -76,32 +76,33 @@ class Seat:
         return None if known is None else self._session
 
     def was_used(self, token: str) -> bool:
-        """Whether a token was a right one once; that is said once a token."""
+        """Whether a token was valid and has been used; true only once for each token."""
         known = _found(token, self._used)
         if known is not None:
             self._used.remove(known)
         return known is not None
 
     def knows(self, cookie: str | None) -> bool:
-        """Whether a cookie is this seat's."""
+        """Whether this is the cookie of the seat."""
         return cookie is not None and compare_digest(cookie.encode(), self._session.encode())
 
     @property
     def is_full(self) -> bool:
-        """Whether there is no room for a page more."""
+        """Whether no further page may be opened."""
         return self.pages >= (MAX_PAGES_OF_A_GUEST if self.number else MAX_PAGES)
 
     @property
     def label(self) -> str:
-        """A guest to others: the number cannot be chosen, so nobody passes for somebody else."""
+        """The name of a guest for others. It has the number, which guests cannot choose, so that no guest can
+        use the name of another."""
         return f"{self.name} (guest {self.number})" if self.name else f"guest {self.number}"
 
     def shown(self) -> dict[str, Any]:
-        """What a guest is told of itself."""
+        """The message to a guest about its own seat."""
         return {"k": "you", "number": self.number, "name": self.name, "is_invited": self.is_invited}
 
     def check(self, asked: str) -> None:
-        """Raise BadInput for what may not be asked from here."""
+        """Raise BadInput for a request that this seat may not make."""
         if not self.number:
             if asked == "name":
                 raise BadInput("name: you fly, allowed: names of guests")
@@ -111,19 +112,20 @@ class Seat:
             raise BadInput(f"{asked}: you are watching, allowed once you are invited")
 
     def check_pace(self, now_s: float) -> None:
-        """Raise BadInput for a guest who asks too much: requests would keep the flight from flying."""
+        """Raise BadInput for a guest with too many requests, which would delay the flight."""
         if self.number and not self._messages.takes(now_s):
             raise BadInput(f"too many requests at once, allowed: {MESSAGES_PER_S:g} a second")
 
     def may_join(self, now_s: float) -> bool:
-        """Whether a page may be opened now: a guest's pages are opened at a bounded pace, as its requests."""
+        """Whether a page may be opened now. The rate of new pages of a guest is limited."""
         return not self.is_full and (not self.number or self._joins.takes(now_s))
 
 
 class Gate:
-    """The secrets of one run of the server.
+    """The seats of one run of the server.
 
-    names: that it is called by, the first in its links. any_own: also by the address a request came to.
+    names: host names of the server; links have the first. any_own: the address that a request has reached is
+    a name, too.
     """
 
     def __init__(
@@ -133,18 +135,19 @@ class Gate:
         self.flyer = Seat()
         self.guests = tuple(Seat(number) for number in range(1, guests + 1))
         self._seats = {seat.room: seat for seat in (self.flyer, *self.guests)}
-        self.wrong = 0  # tokens and cookies that opened nothing
+        self.wrong = 0  # number of wrong tokens and cookies
 
     def link(self, seat: Seat) -> str:
-        """An address that lets somebody in, with a token of its own."""
+        """An address with a new token, which opens the seat."""
         return f"http://{self._authority(self._names[0])}{seat.room}/?token={seat.token()}"
 
     def seat_of(self, path: str) -> Seat | None:
-        """Whose path that is."""
+        """The seat whose path begins this path; None if there is none."""
         return self._seats.get("/" + path.removeprefix("/").partition("/")[0])
 
     def invite(self, guest: int | None, on: bool) -> str:
-        """Let a guest break things, or all, or not any more; in words. Raises BadInput for one not there."""
+        """Allow a guest, or all guests if None, to inject faults, or withdraw this. Returns the text for the
+        pilot. Raises BadInput for an unknown guest."""
         chosen = [seat for seat in self.guests if guest in (None, seat.number)]
         if not chosen:
             raise BadInput(f"guest: {guest} is not there, allowed: 1 to {len(self.guests)}")
@@ -154,19 +157,19 @@ class Gate:
         return f"{who} may break" if on else f"{who} may only look on"
 
     def roster(self) -> dict[str, Any]:
-        """All guests, as the pilot's page shows them."""
+        """The message about all guests to the page of the pilot."""
         guests = [{**seat.shown(), "pages": seat.pages} for seat in self.guests]
         return {"k": "class", "guests": guests, "wrong": self.wrong}
 
     def is_addressed(self, headers: Headers, came_to: str | None = None) -> bool:
-        """Whether a request is meant for this server by its right name. came_to: the address it reached."""
+        """Whether the Host of a request is a name of this server. came_to: the address that it reached."""
         own = (as_name(came_to),) if self._any_own and came_to else ()
         host = headers.get("host", "")
         name = host if self._port == HTTP_PORT else host.removesuffix(f":{self._port}")
         return name in (*self._names, *own) and host == self._authority(name)
 
     def is_own_page(self, headers: Headers, came_to: str | None = None) -> bool:
-        """Whether a websocket is opened by a page of this server."""
+        """Whether a page of this server opens a websocket."""
         host = headers.get("host")
         return headers.get("origin") == f"http://{host}" and self.is_addressed(headers, came_to)
 
@@ -175,7 +178,7 @@ class Gate:
 
 
 def as_name(address: str) -> str:
-    """An address as it stands in a browser's Host: IPv6 in brackets, IPv4 as such wherever it came from."""
+    """An address as a browser writes it in Host: IPv6 in brackets; IPv4 without, also if mapped to IPv6."""
     ip = ip_address(address)
     if isinstance(ip, IPv6Address):
         return str(ip.ipv4_mapped) if ip.ipv4_mapped else f"[{ip.compressed}]"
@@ -183,6 +186,6 @@ def as_name(address: str) -> str:
 
 
 def _found(token: str, among: deque[str]) -> str | None:
-    """The one that is equal, each compared in constant time."""
+    """The token that is equal, each compared in constant time; None if there is none."""
     equal = [known for known in among if compare_digest(known.encode(), token.encode())]
     return equal[0] if equal else None

@@ -225,21 +225,20 @@ def _defects(log: RecordedFlight, used: list[str], rate_names: list[str]) -> Ite
 
 
 def _check_attitude(log: RecordedFlight, vehicle: Vehicle) -> frozenset[str]:
-    """The columns of rates that the angles confirm; none if the roll rate is clipped, as angles are then not
-    compared. Raises BadInput where rates, angles and gravity contradict one another, with the column that
-    seems to be in another unit."""
+    """The columns of rates that the angles confirm; none if a rate is clipped, as angles are then not
+    compared: the integral of a clipped rate is not the change of its angle. Raises BadInput where rates,
+    angles and gravity contradict one another, with the column that seems to be in another unit."""
     columns = log.columns
     rates = {name: columns[name] for name in vehicle.rate_columns}
-    angles = named_angles(columns, vehicle)
-    # The integral of a clipped rate is not the change of its angle.
-    is_clipped = signals.find_clipped_rows(columns[vehicle.rate_columns[0]].values).any()
-    mistake = None if is_clipped else physics.attitude_mistake(rates, angles, _possible_rates(log, vehicle))
+    is_clipped = any(signals.find_clipped_rows(rate.values).any() for rate in rates.values())
+    angles = [None] * 3 if is_clipped else named_angles(columns, vehicle)
+    mistake = physics.attitude_mistake(rates, angles, _possible_rates(log, vehicle))
     acceleration = vehicle.acceleration
     if not mistake and acceleration and (az := columns.get(acceleration.column)):
         mistake = physics.gravity_remark(az, acceleration.column)
     if mistake:
         raise BadInput(f"{log.name}: {mistake}, allowed: what the vehicle file says, or its `unit` mended")
-    return frozenset() if is_clipped else physics.confirmed_rates(rates, angles)
+    return physics.confirmed_rates(rates, angles)
 
 
 def _possible_rates(log: RecordedFlight, vehicle: Vehicle) -> Columns:

@@ -175,7 +175,7 @@ def turned(**changes):
     ({"acc": IN_G * 1e3}, {}, "it is in mg"),
     ({"acc": IN_G * 0.01}, {}, "no unit fits: is 1 g in it?"), ({"acc": IN_G * -9.7}, {}, None),
     ({"acc": IN_G, "psi": -PSI}, {}, "the change of psi is"), ({"acc": IN_G}, {"acceleration": None}, None),
-    ({"p_rad_s": np.minimum(P, 0.3), "psi": -PSI}, {}, None),  # clipped, it is no integral of its angle
+    ({"r_rad_s": np.minimum(R, 0.1), "psi": -PSI}, {}, None),  # a clipped rate: no angle is compared
     (SWAPPED, {}, None),
     (SWAPPED, {"flow": {"beta_rad": "spare"}}, "but spare (1.00): spare is the pitch rate"),
     (SWAPPED, {"commands": ["roll", "pitch", "spare"]}, "but spare (1.00): spare is the pitch rate"),

@@ -16,7 +16,7 @@ from itertools import chain
 
 import numpy as np
 
-from beaver_ftc_logs.recording import Column, Columns, Floats, largest_magnitude
+from beaver_ftc_logs.recording import Column, Columns, Floats, Mask, largest_magnitude
 from beaver_ftc_logs.units import ACCELERATION, ANGLE, RATE, SI_UNITS, UNIT_FACTORS, nearest_unit
 
 _ANGLE_WINDOW_S = 1.0  # the change of an angle is compared with the integral of its rate in windows of 1 s
@@ -38,7 +38,7 @@ _GRAVITIES_G = (0.5, 2.0)  # a column whose median magnitude along z is between 
 _CIRCLE_SLACK = 1.02  # an angle exceeds its full circle by 2 % at most, by rounding and filters
 _MAX_ANGLE_RAD = _CIRCLE_SLACK * 2.0 * np.pi
 _MAX_PITCH_RAD = _CIRCLE_SLACK * 0.5 * np.pi  # a quarter of the circle
-_FAST_RAD_S = 12.0  # no vehicle turns so fast
+FAST_RAD_S = 12.0  # no vehicle turns so fast, though a spike of its gyro may be larger
 _STEEP_PITCH_RAD = 1.0  # above it roll and yaw are hard to distinguish
 
 
@@ -61,23 +61,37 @@ def fit_angle(gyros: Sequence[Column], angles: Sequence[Column | None], axis: in
     Rates and angles are in the units of the log, all rates in one unit. Without a pitch angle, theta is 0.
     Where the nose is steep, roll and yaw are hard to distinguish: such windows are left out for both.
     """
-    roll, pitch, _ = angles
     angle = angles[axis]
     t = gyros[0].t_s
-    if roll is None or angle is None:
+    if angles[0] is None or angle is None:
         return None
     rates = [_interpolate(gyro, t) for gyro in gyros]
-    roll_circle = _full_circle(roll.values)
-    phi = _interpolate(roll, t, roll_circle) * 2.0 * np.pi / roll_circle
-    theta = np.zeros(len(t))
-    if pitch is not None:
-        # Pitch goes up to a quarter of the circle only.
-        pitch_circle = _full_circle(np.append(4.0 * pitch.values, roll.values))
-        theta = _interpolate(pitch, t) * 2.0 * np.pi / pitch_circle
-    terms = _terms_of_change(rates, phi, theta, axis)
-    circle = None if axis == 1 else _full_circle(angle.values)
-    fit = _fit_first_term(*_changes_by_window(t, _interpolate(angle, t, circle), terms, theta, circle))
-    return fit and AngleFit(*fit, largest_magnitude(angle.values), largest_magnitude(rates[axis]))
+    phi, _ = _angle_in_rad(angles, 0, t)
+    theta, _ = _angle_in_rad(angles, 1, t)
+    eta, circle = _angle_in_rad(angles, axis, t)
+    is_steep = (axis != 1) & (np.abs(theta) > _STEEP_PITCH_RAD)
+    fit = _fit_first_term(*_changes_by_window(t, eta, _terms_of_change(rates, phi, theta, axis), is_steep))
+    if fit is None:
+        return None
+    slope, correlation = fit
+    slope = slope * circle / (2.0 * np.pi)
+    return AngleFit(slope, correlation, largest_magnitude(angle.values), largest_magnitude(rates[axis]))
+
+
+def _angle_in_rad(angles: Sequence[Column | None], axis: int, t: Floats) -> tuple[Floats, float]:
+    """The angle of an axis at the stamps t (n,), rad, 0 if it is not known; and a full circle in the unit of
+    the log: the first of rad, deg and cdeg whose circle holds all of the angle.
+
+    Pitch goes up to a quarter of the circle only, and is in the unit of roll if that is larger.
+    """
+    angle = angles[axis]
+    if angle is None:
+        return np.zeros(len(t)), 2.0 * np.pi
+    largest = largest_magnitude(angle.values)
+    if axis == 1 and angles[0] is not None:
+        largest = max(4.0 * largest, largest_magnitude(angles[0].values))
+    circle = next((circle for circle in (2.0 * np.pi, 360.0) if largest <= _CIRCLE_SLACK * circle), 36000.0)
+    return _interpolate(angle, t, circle) * 2.0 * np.pi / circle, circle
 
 
 def _terms_of_change(rates: list[Floats], phi: Floats, theta: Floats, axis: int) -> list[Floats]:
@@ -91,16 +105,15 @@ def _terms_of_change(rates: list[Floats], phi: Floats, theta: Floats, axis: int)
 
 
 def _changes_by_window(
-    t: Floats, angle: Floats, terms: list[Floats], theta: Floats, circle: float | None
+    t: Floats, angle: Floats, terms: list[Floats], is_steep: Mask
 ) -> tuple[Floats, Floats]:
-    """Changes of an angle, y (w,), and of the integrals S of m terms, X (w, m), in w windows from a to b:
+    """Changes of an angle within half a circle, y (w,) rad, and of the integrals S of m terms, X (w, m), in w
+    windows from a to b:
 
         y = angle(b) - angle(a),   X = S(b) - S(a)
 
-    A window with a gap, or without a number of the angle at an end, is left out; a rate without a number
-    counts as 0. circle: a full circle in the unit of the angle, and y is then the change within half a
-    circle; None for pitch, which does not go round. With a circle, windows in which the pitch angle theta
-    (n,) is steep are left out too.
+    A window with a gap, with a steep row (n,), or without a number of the angle at an end, is left out; a
+    rate without a number counts as 0.
     """
     h = np.diff(t)
     means = [np.nan_to_num(0.5 * (term[1:] + term[:-1])) for term in terms]
@@ -109,13 +122,11 @@ def _changes_by_window(
     n = max(round(_ANGLE_WINDOW_S / max(float(np.median(h)), 1e-9)), 1)
     a = np.arange(0, len(t) - n, n)
     b = a + n
-    y = angle[b] - angle[a]
+    y = (angle[b] - angle[a] + np.pi) % (2.0 * np.pi) - np.pi
     X = S[b] - S[a]
+    steep = np.cumsum(is_steep)
     ok = (t[b] - t[a] < 2.0 * _ANGLE_WINDOW_S) & np.isfinite(y) & np.isfinite(X).all(axis=1)
-    if circle is not None:
-        y = (y + 0.5 * circle) % circle - 0.5 * circle
-        steep = np.cumsum(np.abs(theta) > _STEEP_PITCH_RAD)
-        ok &= steep[b] == steep[a]
+    ok &= steep[b] == steep[a]
     return y[ok], X[ok]
 
 
@@ -157,13 +168,6 @@ def _interpolate(column: Column, t: Floats, circle: float | None = None) -> Floa
     if circle is not None:
         values = np.unwrap(values, period=circle)
     return np.interp(t, column.t_s[known], values, left=np.nan, right=np.nan)
-
-
-def _full_circle(angle: Floats) -> float:
-    """A full circle in the unit of the angles: the first of rad, deg and cdeg whose circle holds all of
-    them."""
-    largest = largest_magnitude(angle)
-    return next((circle for circle in (2.0 * np.pi, 360.0) if largest <= _CIRCLE_SLACK * circle), 36000.0)
 
 
 # The name of a column, and the column.
@@ -272,7 +276,7 @@ def _factor_remark(fit: AngleFit, rate: str, angle: str) -> str | None:
         return f"{ratio}: one of them has the other sign, `scale: -1` fits"
     if fit.max_angle_magnitude > _MAX_ANGLE_RAD and (unit := nearest_unit(ANGLE, 1.0 / slope, _UNIT_RATIO)):
         return f"{ratio}: {angle} {_unit_text(unit)}"
-    if fit.max_rate_magnitude > _FAST_RAD_S and (unit := nearest_unit(RATE, slope, _UNIT_RATIO)):
+    if fit.max_rate_magnitude > FAST_RAD_S and (unit := nearest_unit(RATE, slope, _UNIT_RATIO)):
         return f"{ratio}: {rate} {_unit_text(unit)}"
     return f"{ratio}: a factor of {slope:.4g} on {rate} fits, or of {1.0 / slope:.4g} on {angle}"
 

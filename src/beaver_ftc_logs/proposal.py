@@ -60,7 +60,6 @@ from beaver_ftc_logs.vehicle import unused_keys_as_comments
 # Part of the name of a rate -> its unit.
 _UNIT_OF_PART = {"rad_s": "rad/s", "rad/s": "rad/s", "deg_s": "deg/s", "deg/s": "deg/s", "dps": "deg/s"}
 _PWM_RANGE_US = (700.0, 2300.0)  # a command whose median is between these is a pulse
-_LARGEST_RAD_S = 12.0  # larger rates are in deg/s
 _MIN_CORRELATION = 0.7  # a rate and its angle belong together if their correlation is larger
 _MAX_COMMANDS = 8  # largest number of proposed commands
 _LOG_STEPS_S = (1.0 / 2000.0, 1.0 / 4.0)  # shortest and longest usual step of a log
@@ -220,7 +219,7 @@ def _guess_rate_unit(
     """The unit of the rates, the first of a row that is known:
 
         rates and roll angle agree    unit in which they agree, unit by the name, rad/s
-        they do not, or no roll       unit by the name, deg/s above _LARGEST_RAD_S, rad/s
+        they do not, or no roll       unit by the name, deg/s above physics.FAST_RAD_S, rad/s
 
     rad_per_roll_unit: factor on the numbers of the roll angle.
     """
@@ -233,7 +232,7 @@ def _guess_rate_unit(
         if fit is not None and rates_agree(fit):
             unit = nearest_unit(RATE, abs(fit.slope), 1.5) or unit or "rad/s"
     largest = max(largest_magnitude(rate.values) for rate in rates)
-    return unit or ("deg/s" if largest > _LARGEST_RAD_S else "rad/s")
+    return unit or ("deg/s" if largest > physics.FAST_RAD_S else "rad/s")
 
 
 def _column_entry(name: str, unit: str, si_unit: str) -> Any:

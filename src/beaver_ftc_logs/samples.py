@@ -36,7 +36,9 @@ from beaver_ftc_logs.time_base import (
 from beaver_ftc_logs.vehicle import QuantityColumn, Vehicle
 
 _MAX_NUMBER = 1e6  # a larger number in a log is damaged
-_MAX_RATE_RAD_S = 60.0  # larger rates are in another unit
+# A larger rate is in another unit: usual gyros measure up to 35 rad/s. A spike may be larger than any rate of
+# a vehicle (`physics.FAST_RAD_S`), and is no reason to refuse a log.
+_MAX_RATE_RAD_S = 60.0
 _MAX_RATE_SD_RAD_S = 3.0  # a larger standard deviation of a rate causes a remark
 # Limits of the dynamic pressure, over that at the reference airspeed, in `scale_by_airspeed`.
 _QDYN_RATIOS = (0.1, 10.0)

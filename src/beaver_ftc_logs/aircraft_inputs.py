@@ -14,8 +14,9 @@ from beaver_ftc.loop import FLOW, Diagnosis
 from beaver_ftc.results import Document
 from beaver_ftc_logs.recording import Column, Floats, Mask, RecordedFlight, largest_magnitude
 from beaver_ftc_logs.runs import Runs, true_runs
-from beaver_ftc_logs.samples import Samples, convert_to_si, named_angles, resample
+from beaver_ftc_logs.samples import Samples, convert_to_si, resample
 from beaver_ftc_logs.time_base import sample_column
+from beaver_ftc_logs.usable_columns import named_angles
 from beaver_ftc_logs.vehicle import Vehicle
 
 _MAX_HZ = 1000.0  # largest sample rate of a log

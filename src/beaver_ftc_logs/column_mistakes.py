@@ -25,9 +25,10 @@ from beaver_ftc_logs import regression
 from beaver_ftc_logs.corrected_logs import altered_log, corrected_logs
 from beaver_ftc_logs.model import FittedRanges, Model
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
-from beaver_ftc_logs.samples import NOISE_MA_CANDIDATES, Samples, whiten_samples
+from beaver_ftc_logs.samples import Samples
 from beaver_ftc_logs.trust import central_ranges, known_effects, known_gains, unknown_surfaces
 from beaver_ftc_logs.units import RATE, SI_UNITS, nearest_unit
+from beaver_ftc_logs.whitening import NOISE_MA_CANDIDATES, whiten_samples
 
 # All rates are in the same unit if their motions, relative to the flights of the model, differ by less than
 # this factor.

@@ -3,7 +3,7 @@
 Z           regressors (n, m) of a fit (`orders.stack_data`)
 y, e        rates (n, 3) of a fit, and its residual (n, 3), rad/s
 C           coefficients of a fit (m, 3)
-ma          moving average of the noise, 1 first; a flight is *whitened* by it (`samples.whiten_samples`)
+ma          moving average of the noise, 1 first; a flight is *whitened* by it (`whitening.whiten_samples`)
 V, V0       airspeed, m/s, and the airspeed at which a command has the effect of the model, m/s
 """
 
@@ -24,15 +24,14 @@ from beaver_ftc_logs.least_squares import left_by
 from beaver_ftc_logs.model import FittedRanges, Model, NoiseModel
 from beaver_ftc_logs.recording import Floats
 from beaver_ftc_logs.regression import Parts
-from beaver_ftc_logs.samples import (
+from beaver_ftc_logs.samples import Samples, scale_by_airspeed
+from beaver_ftc_logs.vehicle import Vehicle
+from beaver_ftc_logs.whitening import (
     NOISE_MA_CANDIDATES,
     UNFITTED_GYROS_RAD_S,
     UNFITTED_MA,
-    Samples,
-    scale_by_airspeed,
     whiten_samples,
 )
-from beaver_ftc_logs.vehicle import Vehicle
 
 SCORES = ("classes", "healthy_or_faulty", "mean_error", "held_by_bounds")
 # A model is decisively better if its information criterion is less by this: odds of 150 to 1 [Kass1995,

@@ -33,7 +33,8 @@ from beaver_ftc_logs.groups import Groups, group_commands, group_indices
 from beaver_ftc_logs.model import Model, NoiseModel
 from beaver_ftc_logs.recording import Floats, Ints, Mask
 from beaver_ftc_logs.runs import runs_between, trailing_sums
-from beaver_ftc_logs.samples import Samples, whiten_samples
+from beaver_ftc_logs.samples import Samples
+from beaver_ftc_logs.whitening import whiten_samples
 
 _N_PARTS = 4  # number of parts in `split_parts`
 _MIN_PART_ROWS = 60  # least number of rows in each

@@ -285,6 +285,11 @@ class Vehicle(Section):
         return [signal.column for signal in self.signals]
 
     @property
+    def sampled_columns(self) -> list[str]:
+        """The columns of rates, commands and signals, each once."""
+        return list(dict.fromkeys(self.rate_columns + self.command_columns + self.signal_columns))
+
+    @property
     def max_sample_rate_hz(self) -> float:
         """The rate above which a log is averaged, Hz. In moving air it is higher: a law can react to a gust
         within the interval of an average, and a fit cannot distinguish this reaction from the effect of the

@@ -9,7 +9,7 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs import column_mistakes, fitting, gyro_noise, identification, loading, orders
 from beaver_ftc_logs.bank import build_bank
 from beaver_ftc_logs.filtering import bank_posterior
-from beaver_ftc_logs.samples import whiten_samples
+from beaver_ftc_logs.whitening import whiten_samples
 from products.logs import small
 
 AVERAGE = (1.0, -1.4, 0.49)

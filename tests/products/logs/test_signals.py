@@ -32,7 +32,7 @@ def with_rows(rows, *values, seed=1):
     (noise(), []),
     (with_rows([slice(200, 261)], 0.3), ["p: frozen, the same to the last bit for 3.0 s"]),
     (noise() + 50.0 * np.isin(np.arange(1200), [100, 700]), ["p: 2 jumps, the first at 5.00 s"]),
-    (noise() + 25.0 * (T_S > 14.98) + 25.0 * (T_S > 15.02), []),  # up twice, and not back
+    (0.1 * noise() + 2.5 * (T_S > 14.98) + 2.5 * (T_S > 15.02), []),  # up twice, and not back
     (with_rows([slice(3, 10)], np.nan), ["p: rows without a number: 7 of 1200"]),
 ])  # fmt: skip
 def test_what_is_said_of_a_column(values, says):

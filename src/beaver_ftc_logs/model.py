@@ -106,7 +106,7 @@ class FilterSettings(_LastingSection):
     """
 
     changes_per_hour: Positive = 12.0
-    repair_share: Number = Field(0.1, ge=0, lt=1)
+    repair_share: ShareBelowOne = 0.1
     levels: dict[str, Annotated[list[ShareBelowOne], Field(max_length=100)]] = Field({})
     level_share: Share = 0.9
     trim_sd: Positive = 0.5
@@ -125,8 +125,8 @@ class FilterSettings(_LastingSection):
     tail: Number = Field(8.0, gt=2, le=_MAX_COEF)
     noise_memory_s: Positive = 60.0
     alarm: OpenShare = 0.5
-    false_alarms_per_hour: Number | None = Field(None, gt=0, le=_MAX_COEF)
-    threshold: Number | None = Field(None, gt=0, le=_MAX_COEF)
+    false_alarms_per_hour: Positive | None = None
+    threshold: Positive | None = None
     name_evidence: AtLeastOne = 1.0
     rename_s: NonNegative = 0.0
     one_group: bool = False
@@ -180,7 +180,7 @@ class NoiseModel(Section):
     before: CoefRows = Field([])
     wider: AtLeastOne = 1.0
     misreads: list[ShareBelowOne] = Field([])
-    quick: Number | None = Field(default=None, ge=0, le=_MAX_COEF)
+    quick: NonNegative | None = None
 
     @property
     def usual_quick_power(self) -> float:

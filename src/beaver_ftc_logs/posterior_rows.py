@@ -66,7 +66,7 @@ def rows_of_posterior(
     return LogRows(
         t_s=samples.t_s,
         faulty=faulty,
-        isolated_surfaces=_surfaces_at_fault(model, bank, P, faulty, _latched(nameable, calm)),
+        isolated_surfaces=_surfaces_at_fault(model, bank, P, p_fault, faulty, _latched(nameable, calm)),
         effectiveness=expand_groups(a, model),
         effectiveness_low=expand_groups(low, model),
         effectiveness_high=expand_groups(high, model),
@@ -138,7 +138,9 @@ def _credible_bounds(levels: Floats, p: Floats, mass: float) -> tuple[Floats, Fl
     return edges[np.searchsorted(levels, low)], edges[np.searchsorted(levels, high) + 1]
 
 
-def _surfaces_at_fault(model: Model, bank: HypothesisBank, P: Floats, faulty: Ints, nameable: Mask) -> Names:
+def _surfaces_at_fault(
+    model: Model, bank: HypothesisBank, P: Floats, p_fault: Floats, faulty: Ints, nameable: Mask
+) -> Names:
     """The named surfaces of each row, (n,): those of the likely groups (`_likely_groups`). While the alarm
     stands, a row without a name is `unknown`. The first row of an alarm takes its new name. Later the old
     name stays if one of these is true:
@@ -148,40 +150,39 @@ def _surfaces_at_fault(model: Model, bank: HypothesisBank, P: Floats, faulty: In
         3. the old name is not `unknown`, `one_group` is set, and the new name is `unknown` or contains all
            surfaces of the old one: an excluded surface stays excluded
 
-    names (n,): by the probabilities of each row alone; named (n,): the result. new: name of this row by
-    `names`; old: name of the row before by `named`; n_same: number of rows directly before that have the same
-    new name.
+    p_fault (n,): probability of any fault. names (n,): by the probabilities of each row alone; result (n,).
+    new: name of this row by `names`; old: name of the row before by `result`; n_same: number of rows directly
+    before that have the same new name.
     """
-    p_fault = np.maximum(P[:, bank.is_fault_hypothesis].sum(axis=1), MIN_DIVISOR)
     likely = _likely_groups(model, bank, P, p_fault)
     names = join_names(likely & nameable[:, None], model.group_names)
-    named = np.full(len(P), "", dtype=object)
-    offset = P[:, bank.hypothesis_kind == UNKNOWN_OFFSET].sum(axis=1) > p_fault
+    result = np.full(len(P), "", dtype=object)
+    is_offset = P[:, bank.hypothesis_kind == UNKNOWN_OFFSET].sum(axis=1) > p_fault
     n_hold = round(model.settings.rename_s * model.rate_hz)
     n_same = 0
     for k in np.flatnonzero(faulty):
         new = names[k] or UNKNOWN_SURFACE
-        old = named[k - 1] if k else ""
+        old = result[k - 1] if k else ""
         n_same = n_same + 1 if k and new == (names[k - 1] or UNKNOWN_SURFACE) else 0
         excludes_none = new == UNKNOWN_SURFACE or set(old.split("+")) <= set(new.split("+"))
-        waits = n_same < n_hold or (model.settings.one_group and excludes_none)
-        keeps = old and (offset[k] or (old != UNKNOWN_SURFACE and waits))
-        named[k] = old if keeps else new
-    return named
+        is_barred = n_same < n_hold or (model.settings.one_group and excludes_none)  # 2, 3
+        keeps_old = old and (is_offset[k] or (old != UNKNOWN_SURFACE and is_barred))
+        result[k] = old if keeps_old else new
+    return result
 
 
 def _likely_groups(model: Model, bank: HypothesisBank, P: Floats, p_fault: Floats) -> Mask:
     """The groups (n, G) that the name of a row may have.
 
     one_group   groups
-    false       those whose faults have more than _NAME_SHARE of the probability p_fault (n,)
+    false       those whose faults have more than _NAME_SHARE of p_fault (n,)
     true        those whose loss alone is more than _EXCLUSION_RISK times as probable as the likeliest loss;
                 none in a row in which these are all of several groups that can have a loss
     """
     faults = [bank.is_fault_of_group(g) for g in range(len(model.groups))]
     if not model.settings.one_group:
-        p_groups = [P[:, of_group].sum(axis=1) / p_fault for of_group in faults]
-        return np.column_stack(p_groups) > _NAME_SHARE
+        p_groups = np.column_stack([P[:, of_group].sum(axis=1) for of_group in faults])
+        return p_groups / np.maximum(p_fault, MIN_DIVISOR)[:, None] > _NAME_SHARE
     losses = [of_group & (bank.hypothesis_kind == GROUP_LOSS) for of_group in faults]
     p_loss = np.column_stack([P[:, of_group].sum(axis=1) for of_group in losses])
     likely = p_loss > _EXCLUSION_RISK * p_loss.max(axis=1, keepdims=True)

@@ -110,8 +110,9 @@ def resample(log: RecordedFlight, vehicle: Vehicle) -> Samples:
         return sample_column(column, t_s, step_s)[0] if column else np.full(len(t_s), np.nan)
 
     defects = (column_defect_texts(name, log.columns[name], name in rate_names) for name in used)
-    altitude_m = sampled(vehicle.energy and vehicle.energy.altitude)
-    airspeed_mps = sampled(vehicle.energy and vehicle.energy.airspeed)
+    energy_columns = vehicle.energy
+    altitude_m = sampled(energy_columns.altitude if energy_columns else None)
+    airspeed_mps = sampled(energy_columns.airspeed if energy_columns else None)
     samples = Samples(
         name=log.name,
         t_s=t_s,

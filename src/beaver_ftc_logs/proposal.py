@@ -46,6 +46,7 @@ from beaver_ftc_logs.recording import (
     nearest_names_text,
 )
 from beaver_ftc_logs.time_base import median_step_s
+from beaver_ftc_logs.unit_mistakes import FAST_RAD_S
 from beaver_ftc_logs.units import (
     ACCELERATION,
     HALF_PULSE_RANGE_US,
@@ -219,7 +220,7 @@ def _guess_rate_unit(
     """The unit of the rates, the first of a row that is known:
 
         rates and roll angle agree    unit in which they agree, unit by the name, rad/s
-        they do not, or no roll       unit by the name, deg/s above physics.FAST_RAD_S, rad/s
+        they do not, or no roll       unit by the name, deg/s above FAST_RAD_S, rad/s
 
     rad_per_roll_unit: factor on the numbers of the roll angle.
     """
@@ -232,7 +233,7 @@ def _guess_rate_unit(
         if fit is not None and rates_agree(fit):
             unit = nearest_unit(RATE, abs(fit.slope), 1.5) or unit or "rad/s"
     largest = max(largest_magnitude(rate.values) for rate in rates)
-    return unit or ("deg/s" if largest > physics.FAST_RAD_S else "rad/s")
+    return unit or ("deg/s" if largest > FAST_RAD_S else "rad/s")
 
 
 def _column_entry(name: str, unit: str, si_unit: str) -> Any:

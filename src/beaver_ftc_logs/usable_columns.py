@@ -4,13 +4,13 @@ the vehicle file says, or the log is refused. `column_mistakes` compares the col
 import numpy as np
 
 from beaver_ftc.documents import BadInput
-from beaver_ftc_logs import physics, signals
+from beaver_ftc_logs import signals, unit_mistakes
 from beaver_ftc_logs.recording import Columns, RecordedFlight, largest_magnitude
 from beaver_ftc_logs.vehicle import Vehicle
 
 MAX_NUMBER = 1e6  # a larger number in a log is damaged
 # A larger rate is in another unit: usual gyros measure up to 35 rad/s. A spike may be larger than any rate of
-# a vehicle (`physics.FAST_RAD_S`), and is no reason to refuse a log.
+# a vehicle (`unit_mistakes.FAST_RAD_S`), and is no reason to refuse a log.
 _MAX_RATE_RAD_S = 60.0
 
 
@@ -42,13 +42,13 @@ def confirm_rates(log: RecordedFlight, vehicle: Vehicle) -> frozenset[str]:
     rates = {name: columns[name] for name in vehicle.rate_columns}
     is_clipped = any(signals.find_clipped_rows(rate.values).any() for rate in rates.values())
     angles = [None] * 3 if is_clipped else named_angles(columns, vehicle)
-    mistake = physics.attitude_mistake(rates, angles, _possible_rates(log, vehicle))
+    mistake = unit_mistakes.attitude_mistake(rates, angles, _possible_rates(log, vehicle))
     acceleration = vehicle.acceleration
     if not mistake and acceleration and (az := columns.get(acceleration.column)):
-        mistake = physics.gravity_remark(az, acceleration.column)
+        mistake = unit_mistakes.gravity_remark(az, acceleration.column)
     if mistake:
         raise BadInput(f"{log.name}: {mistake}, allowed: what the vehicle file says, or its `unit` mended")
-    return physics.confirmed_rates(rates, angles)
+    return unit_mistakes.confirmed_rates(rates, angles)
 
 
 def _possible_rates(log: RecordedFlight, vehicle: Vehicle) -> Columns:
@@ -58,7 +58,7 @@ def _possible_rates(log: RecordedFlight, vehicle: Vehicle) -> Columns:
     return {name: log.columns[name] for name in names if name in log.columns}
 
 
-def named_angles(columns: Columns, vehicle: Vehicle) -> list[physics.NamedColumn | None]:
+def named_angles(columns: Columns, vehicle: Vehicle) -> list[unit_mistakes.NamedColumn | None]:
     """The columns of roll, pitch and yaw with their names; None for an angle that is not named or not
     logged."""
     keys = [getattr(vehicle.attitude, angle, None) for angle in ("roll", "pitch", "yaw")]

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from beaver_ftc_logs import physics, signals
+from beaver_ftc_logs import physics, signals, unit_mistakes
 from beaver_ftc_logs.recording import Column
 from samples import samples
 
@@ -89,10 +89,9 @@ def test_rates_are_the_change_of_each_angle():
     yaw = (yawed() - yawed()[400]) % (2.0 * np.pi)
     columns = [Column(T_S, one) for one in rates]
     angles = [Column(T_S[1::2], one[1::2]) for one in (phi, theta, yaw)]
-    for axis, rate in enumerate(rates):
+    for axis in range(3):
         found = physics.fit_angle(columns, angles, axis)
-        figures = found.slope, found.correlation, found.max_rate_magnitude
-        assert figures == pytest.approx((1.0, 1.0, np.abs(rate).max()), rel=2e-3)
+        assert (found.slope, found.correlation) == pytest.approx((1.0, 1.0), rel=2e-3)
 
 
 def test_nothing_is_said_of_an_angle_that_does_not_move():
@@ -104,7 +103,7 @@ def test_nothing_is_said_of_an_angle_that_does_not_move():
     angles = [("roll", still), ("pitch", Column(T_S, 0.14 + 7e-6 * T_S)), None]
     rates = {name: Column(T_S, 1e-8 * np.sin(T_S)) for name in ("gx", "gy", "gz")}
     alpha = {"alpha": Column(T_S, 0.14 + 0.0 * T_S)}
-    assert physics.attitude_mistake(rates, angles, alpha) is None
+    assert unit_mistakes.attitude_mistake(rates, angles, alpha) is None
 
 
 def test_nothing_is_said_where_the_nose_is_steep():
@@ -114,5 +113,5 @@ def test_nothing_is_said_where_the_nose_is_steep():
     still, theta = Column(T_S, 1e-3 * np.sin(T_S)), Column(T_S, np.arcsin(np.sin(looping)))
     rates = {"gx": still, "gy": Column(T_S, np.full(len(T_S), 0.3)), "gz": still}
     angles = [("roll", over), ("pitch", theta), ("yaw", over)]
-    assert physics.attitude_mistake(rates, angles, {}) is None
+    assert unit_mistakes.attitude_mistake(rates, angles, {}) is None
     assert physics.fit_angle(list(rates.values()), [over, theta, None], 0) is None

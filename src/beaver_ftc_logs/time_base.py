@@ -29,28 +29,33 @@ def sample_times(flight: str, stamps: Floats, max_hz: float) -> tuple[Floats, In
     _refuse_rate(flight, 1.0 / step_s)
     if 1.0 / step_s <= _ALIKE_RATIO * max_hz:
         return stamps, np.cumsum(np.diff(stamps, prepend=stamps[0]) > _MIN_GAP_STEPS * step_s), step_s
-    even = _even_times(stamps, 1.0 / max_hz)
-    if len(even[0]) < _MIN_ROWS:
-        reason = f"{n} rows within {stamps[-1] - stamps[0]:.3g} s are {len(even[0])} samples at {max_hz:g} Hz"
-        allowed = f"at least {_MIN_ROWS}; is time in another unit?"
-        raise BadInput(f"{flight}: {reason}, allowed: {allowed}")
-    return even
+    step_s = 1.0 / max_hz
+    t_s, stretch = _even_times(stamps, step_s)
+    if len(t_s) < _MIN_ROWS:
+        raise BadInput(
+            f"{flight}: {n} rows within {stamps[-1] - stamps[0]:.3g} s are {len(t_s)} samples at {max_hz:g} "
+            f"Hz, allowed: at least {_MIN_ROWS}; is time in another unit?"
+        )
+    return t_s, stretch, step_s
 
 
 def _refuse_rate(flight: str, rate_hz: float) -> None:
     """Raise BadInput if the rates are logged more slowly than MIN_HZ or faster than _MAX_HZ."""
     logged = f"{flight}: rates are logged at {rate_hz:.2g} Hz"
     if rate_hz < MIN_HZ:
-        units = {unit: rate_hz / seconds for unit, seconds in TIME_UNITS.items() if unit != "s"}
-        hints = [f" (time in {unit} would be {hz:.3g} Hz)" for unit, hz in units.items() if 10 <= hz <= 1000]
-        reason = f"to tell a surface's effect from the vehicle's own motion{''.join(hints[:1])}"
-        raise BadInput(f"{logged}, allowed: at least {MIN_HZ:g} Hz {reason}")
+        rates = {unit: rate_hz / seconds for unit, seconds in TIME_UNITS.items() if unit != "s"}
+        hints = (f" (time in {unit} would be {hz:.3g} Hz)" for unit, hz in rates.items() if 10 <= hz <= 1000)
+        raise BadInput(
+            f"{logged}, allowed: at least {MIN_HZ:g} Hz to tell a surface's effect from the vehicle's own "
+            f"motion{next(hints, '')}"
+        )
     if rate_hz > _MAX_HZ:
         raise BadInput(f"{logged}, allowed: up to {_MAX_HZ:g} Hz, time in seconds")
 
 
-def _even_times(stamps: Floats, step_s: float) -> tuple[Floats, Ints, float]:
-    """As `sample_times`: samples one step apart in each stretch of the log, from its first stamp on.
+def _even_times(stamps: Floats, step_s: float) -> tuple[Floats, Ints]:
+    """Times and stretches as in `sample_times`: samples one step apart in each stretch of the log, from its
+    first stamp on.
 
     begin, last: first and last row of each stretch in the log; counts: number of its samples; index (n,):
     number of each sample in its stretch.
@@ -60,7 +65,7 @@ def _even_times(stamps: Floats, step_s: float) -> tuple[Floats, Ints, float]:
     counts = np.ceil((stamps[last] - stamps[begin]) / step_s + 0.5).astype(np.int64)
     stretch = np.repeat(np.arange(len(begin)), counts)
     index = np.arange(len(stretch)) - np.repeat(np.cumsum(counts) - counts, counts)
-    return stamps[begin][stretch] + index * step_s, stretch, step_s
+    return stamps[begin][stretch] + index * step_s, stretch
 
 
 def median_step_s(stamps: Floats) -> float:

@@ -27,7 +27,7 @@ from beaver_ftc_links.sitl import Protocol
 
 @dataclass(frozen=True)
 class Options:
-    """What is asked of it, as `command` says."""
+    """The argument and the options of the command; `command` describes each."""
 
     scenario: ScenarioArgument
     protocol: Annotated[Protocol, typer.Option("--as")]

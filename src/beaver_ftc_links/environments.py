@@ -1,8 +1,8 @@
-"""The environment's name in Gymnasium's registry.
+"""The name of the environment in the registry of Gymnasium.
 
-Gymnasium 1 reads no entry points of packages any more: a name is known once its package is imported. But
-importing the core must stay quick and must not need Gymnasium. So `register` is an entry point that the core
-calls as soon as both the core and Gymnasium's registry are imported.
+Gymnasium 1 no longer reads entry points of packages: a name is registered when its package is imported. But
+the import of the core must be quick and must not need Gymnasium. So `register` is an entry point that the
+core calls as soon as both the core and the registry of Gymnasium are imported.
 """
 
 from types import ModuleType

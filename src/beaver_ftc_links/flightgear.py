@@ -1,4 +1,4 @@
-"""Shows a flight in FlightGear while it is flown: JSBSim's own output, at the pace of the clock."""
+"""Show a flight in FlightGear in real time, by the output of JSBSim."""
 
 import time
 from collections.abc import Callable
@@ -11,9 +11,9 @@ DIRECTIVE = f"aircraft/{DEFAULT}/flightgear.xml"
 
 
 def show_in_flightgear(plant: Plant, host: str, port: int) -> None:
-    """Send the plant's state to FlightGear from its start on, and hold its frames back to real time.
+    """Send the state of the plant to FlightGear from its start on, and delay its frames to real time.
 
-    Call it before `Plant.start`, with which JSBSim opens the socket. UDP: nobody need listen.
+    Call it before `Plant.start`, in which JSBSim opens the socket. UDP needs no receiver.
     """
     loaded = plant.fdm.set_output_directive(DIRECTIVE)
     # JSBSim 1.3.3 documents HOST:PORT/PROTOCOL, and takes HOST:PROTOCOL/PORT.
@@ -29,7 +29,7 @@ def paced(
     clock: Callable[[], float] = time.monotonic,
     sleep: Callable[[float], None] = time.sleep,
 ) -> Callable[[], bool]:
-    """`run` no sooner than dt_s after its last turn was due; what is late is not caught up in a burst."""
+    """`run`, delayed until dt_s after the last call was due. After a late call, the next do not catch up."""
     due = clock()
 
     def on_time() -> bool:

@@ -1,20 +1,19 @@
-"""The Beaver as a Gymnasium environment, alone or many at a time; for those who learn laws.
+"""The Beaver as a Gymnasium environment, to learn control laws: one flight, or several at a time.
 
-It wants the extra `gym`.
+Needs Gymnasium: the extra `gym`.
 
     import beaver_ftc
     import gymnasium
 
     env = gymnasium.make("beaver_ftc/Beaver-v0", scenario="fault-free", frames_per_step=5)
 
-The name is registered once both packages are imported, in either order (environments.py).
-The plant, the faults, the reference model and the accounts are those of a flight: what is learnt can be
-plugged in afterwards as a law, and compared with the others.
+The name is registered once both packages are imported, in either order (`environments`). Plant, faults,
+reference model and metrics are those of any flight, so a learned law can be plugged in and compared.
 
-Many at a time, in processes: `gymnasium.make_vec` with the same name and `num_envs=16`. A step of the
-environment takes less than handing its arrays from process to process. So each process flies several
-episodes, one byte sets it going, and what it flies by and sees is in memory that all share. The process that
-asks flies a part itself instead of waiting.
+Several flights: `gymnasium.make_vec` with the same name and `num_envs=16`. To copy the arrays of a step from
+process to process takes longer than the step. So each process flies several episodes, receives an empty
+message for a step, and reads actions and writes observations in shared memory. The process of the caller
+flies a part of the episodes, too.
 """
 
 import contextlib
@@ -51,25 +50,26 @@ from beaver_ftc.scenario import ScenarioLike, load
 from beaver_ftc.studies.engine import cores, single_threaded
 from beaver_ftc.studies.engine import process_context as context
 
-DEPARTURE = -100.0
-NO_SENSOR = {"control.law": "nominal", "control.options": {}}  # the surfaces are the agent's
-
-_STEP, _NOTHING = b"", b""  # to a worker, and from one that has no more to say
-_PATIENCE_S = 5.0  # for a worker to end by itself
+DEPARTURE = -100.0  # reward of a departure
+_NO_LAW = {"control.law": "nominal", "control.options": {}}  # changes of the scenario: the agent is the law
+_STEP = b""  # message to a worker: fly a step
+_NOTHING = b""  # message from a worker: it has no infos
+_PATIENCE_S = 5.0  # time for a worker to end by itself
 
 Vector = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Info = dict[str, Any]
-Infos = dict[int, Info]  # of the episodes that have any
+Infos = dict[int, Info]  # number of an episode -> its info, if it has one
 
 
 class Episode(Simulation):
-    """A flight of an agent, frame 0 flown: its actions, its observations, what its steps cost."""
+    """A flight that an agent commands: actions, observations and costs. It begins with frame 0 flown."""
 
     def _make_ready(self) -> None:
         super()._make_ready()
         self._cost = 0.0
-        frames, log = self._loop.frames, self._loop.log
+        frames = self._loop.frames
+        log = self._loop.log
         self._look = look_of(self.columns)
         self._size = self.trim_rad.size
         seen = np.empty(0)
@@ -80,12 +80,14 @@ class Episode(Simulation):
         note_first_readings(self._look, self.measured.y)
 
     def act(self, action: ArrayLike, frames: int) -> float:
-        """Fly so many frames, or to the end, with an action (surfaces,) held; returns what they cost."""
+        """Fly so many frames, or to the end of the flight, with an action (surfaces,) that is held; returns
+        their cost. Raises BadInput for an action of another shape, or with a number that is not finite."""
         shares = _numbers("action", action, (self._size,))
-        if shares.shape != (self._size,) or not self._acts(self._loop.frames, shares):
+        if not self._acts(self._loop.frames, shares):
             raise BadInput(f"action: {action!r:.80} is not usable, allowed: {self._size} finite numbers")
         self._asked.append(Asked("act", {"action": shares.copy()}, frames))
-        self._cost, self._by_hand = 0.0, True
+        self._cost = 0.0
+        self._by_hand = True
         self._fly_to(min(self._next + frames, self._loop.n_frames))
         return self._cost
 
@@ -93,14 +95,14 @@ class Episode(Simulation):
         self._cost += self._costs(self._loop.frames, rows, self._look)
 
     def observation(self) -> Vector:
-        """What is seen of the frame just flown, (12 + surfaces,); an array of its own."""
+        """The observation after the last frame, (12 + surfaces,); a new array."""
         seen = np.empty(BESIDE_SURFACES + self._size)
         self._observes(self._loop.frames, self._loop.log, self._look, seen)
         return seen
 
 
 class BeaverEnv(gymnasium.Env[Vector, Vector]):
-    """One flight an episode, so many frames a step; the scenario's diagnosis watches.
+    """An episode is a flight, a step some frames of it. The diagnosis of the scenario runs, too.
 
     Action (surfaces,) in [-1, 1]: each surface from its trim (0) to its lower or upper stop, held over the
     step. Observation (12 + surfaces,), after the step: p, q, r over 0.1 rad/s; alpha and beta less trim over
@@ -110,11 +112,11 @@ class BeaverEnv(gymnasium.Env[Vector, Vector]):
     episode.
     `info["metrics"]` of the last step is the document metrics.json.
 
-    scenario: a name, a path, a mapping or a Scenario. frames_per_step: how long an action is held.
-    render_mode: None alone, there is nothing to render.
+    scenario: a name, a path, a mapping or a Scenario. frames_per_step: number of frames of a step.
+    render_mode: only None, as there is nothing to render.
 
-    A pickled environment, or a copy (`copy.deepcopy`), is in the same state and goes on by itself. The
-    episode is flown again until now, as in `Simulation.clone`.
+    A pickled environment, or a copy (`copy.deepcopy`), has the same state and is independent: its episode is
+    flown again up to now, as in `Simulation.clone`.
     """
 
     metadata = {"render_modes": []}  # noqa: RUF012  (the name and form Gymnasium looks for)
@@ -122,7 +124,7 @@ class BeaverEnv(gymnasium.Env[Vector, Vector]):
     def __init__(
         self, scenario: ScenarioLike = "fault-free", frames_per_step: int = 1, render_mode: None = None
     ) -> None:
-        self.scenario = load(scenario).with_(NO_SENSOR)
+        self.scenario = load(scenario).with_(_NO_LAW)
         _check_count("frames_per_step", frames_per_step)
         if render_mode is not None:
             raise BadInput(f"render_mode: {render_mode!r:.60} is not known, allowed: None")
@@ -135,8 +137,8 @@ class BeaverEnv(gymnasium.Env[Vector, Vector]):
         self._seeded = False
 
     def reset(self, *, seed: int | None = None, options: Info | None = None) -> tuple[Vector, Info]:
-        """Put the aircraft in trim. A seed replaces the scenario's, and those of the episodes to come follow
-        from it; without any they all have the scenario's."""
+        """Put the aircraft in trim. A seed replaces that of the scenario, and the seeds of later episodes are
+        drawn from it. If no seed was ever given, each episode has that of the scenario."""
         seed = None if seed is None else _seed(seed)
         super().reset(seed=seed)
         self._seeded |= seed is not None
@@ -150,7 +152,7 @@ class BeaverEnv(gymnasium.Env[Vector, Vector]):
         return self._episode.observation(), {}
 
     def step(self, action: Vector) -> tuple[Vector, float, bool, bool, Info]:
-        """Command the surfaces, fly, look."""
+        """Command the surfaces, fly the frames of a step, and observe."""
         episode = self._episode
         if episode is None:
             raise gymnasium.error.ResetNeeded("call reset() before step()")
@@ -164,7 +166,7 @@ class BeaverEnv(gymnasium.Env[Vector, Vector]):
         return episode.observation(), reward + DEPARTURE * departed, departed, not departed, info
 
     def clone(self) -> "BeaverEnv":
-        """Another environment in the same state: what is done to one changes nothing in the other."""
+        """An independent environment in the same state."""
         return deepcopy(self)
 
     def __getstate__(self) -> Info:
@@ -176,8 +178,8 @@ class BeaverEnv(gymnasium.Env[Vector, Vector]):
 
 
 class _Part(NamedTuple):
-    """Some of the episodes: the memory that all share, how many numbers an action and an observation have,
-    which of its rows they are, and the options of their environments."""
+    """Some of the episodes. block: memory that all processes share. sizes: numbers in an action and in an
+    observation. rows: rows of these episodes in the memory. options: of their environments."""
 
     block: "Array[c_double]"
     sizes: tuple[int, int]
@@ -186,22 +188,26 @@ class _Part(NamedTuple):
 
 
 class _Shared:
-    """A row an episode: its action, its observation, reward, whether it is terminated, whether truncated."""
+    """The shared memory as arrays with a row for each episode: its action, observation, reward, and whether
+    it is terminated or truncated (1 or 0)."""
 
     def __init__(self, block: "Array[c_double]", sizes: tuple[int, int], rows: slice) -> None:
         actions, seen = sizes
         values = np.frombuffer(memoryview(block)).reshape(-1, actions + seen + 3)[rows]
-        self.actions, self.seen = values[:, :actions], values[:, actions : actions + seen]
-        self.rewards, self.terminated, self.truncated = values[:, -3], values[:, -2], values[:, -1]
+        self.actions = values[:, :actions]
+        self.seen = values[:, actions : actions + seen]
+        self.rewards = values[:, -3]
+        self.terminated = values[:, -2]
+        self.truncated = values[:, -1]
 
 
 class BeaverVectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any]):
-    """`num_envs` environments as one, flown by `workers` processes, this one among them; as many as there are
-    cores if left out.
+    """`num_envs` environments as one, flown by `workers` processes, of which the caller's is one; by default
+    as many as there are cores.
 
-    options: those of BeaverEnv. An episode that is over restarts with the next step, whose action is not
-    looked at (AutoresetMode.NEXT_STEP). `infos["metrics"][i]` is the document metrics.json of an episode that
-    has ended with this step, `infos["_metrics"]` says which have.
+    options: those of BeaverEnv. An episode that is over restarts with the next step, which ignores its action
+    (AutoresetMode.NEXT_STEP). `infos["metrics"][i]` is the document metrics.json of an episode that ended
+    with this step; `infos["_metrics"]` shows which episodes did.
     """
 
     metadata = {"autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012  (the form Gymnasium looks for)
@@ -211,7 +217,8 @@ class BeaverVectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any]):
         _check_count("workers", 1 if workers is None else workers)
         self.num_envs = num_envs
         one = BeaverEnv(**options)
-        self.single_action_space, self.single_observation_space = one.action_space, one.observation_space
+        self.single_action_space = one.action_space
+        self.single_observation_space = one.observation_space
         self.action_space = batch_space(one.action_space, num_envs)
         self.observation_space = batch_space(one.observation_space, num_envs)
         sizes = flatdim(one.action_space), flatdim(one.observation_space)
@@ -219,15 +226,16 @@ class BeaverVectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any]):
         self._shared = _Shared(block, sizes, slice(None))
         options |= {"scenario": one.scenario}
         workers = min(num_envs, workers or cores())
-        ends = [num_envs * w // workers for w in range(workers + 1)]  # as even as can be
+        ends = [num_envs * w // workers for w in range(workers + 1)]  # shares as equal as possible
         *others, own = (_Part(block, sizes, slice(*rows), options) for rows in pairwise(ends))
-        # its own come last, when all others fly
+        # The episodes of this process come last: it flies them while the others fly.
         self._workers: list[_Worker | _Episodes] = [*map(_Worker, others), _Episodes(own)]
 
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: Info | None = None
     ) -> tuple[Vector, Info]:
-        """Put every aircraft in trim. A seed is the first one's, the others have those after it."""
+        """Put every aircraft in trim. seed: that of the first episode, from which the others count on; or one
+        for each episode."""
         if seed is None or isinstance(seed, Sequence | np.ndarray):
             given = [None] * self.num_envs if seed is None else list(seed)
             seeds = [None if one is None else _seed(one) for one in given]
@@ -242,7 +250,7 @@ class BeaverVectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any]):
         return self._shared.seen.copy(), infos
 
     def step(self, actions: ArrayLike) -> tuple[Vector, Vector, Flags, Flags, Info]:
-        """Command the surfaces, fly, look: all at the same time."""
+        """Command the surfaces of all aircraft, fly a step of each, and observe."""
         shared = self._shared
         shared.actions[:] = _numbers("actions", actions, shared.actions.shape)
         for worker in self._workers:
@@ -257,7 +265,8 @@ class BeaverVectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any]):
             worker.end()
 
     def _answers(self) -> Info:
-        """Wait for all; what they have to say, by Gymnasium's rule, but a document stays one."""
+        """Wait for all workers; their infos in the form of Gymnasium, except that a document stays one
+        object. Raises the error of a worker."""
         said: Infos = {}
         failed: Exception | None = None
         for worker in self._workers:
@@ -278,7 +287,7 @@ class BeaverVectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any]):
 
 
 class _Episodes:
-    """Some of the episodes, flown in this process, when it is told to."""
+    """Some of the episodes, flown in this process."""
 
     def __init__(self, part: _Part) -> None:
         self.part = part
@@ -287,7 +296,7 @@ class _Episodes:
         self._answer: Infos | Exception = {}
 
     def tell(self, what: bytes) -> None:
-        """A step, or a reset by the seeds given."""
+        """Fly a step if `what` is _STEP; otherwise reset, by the pickled seeds in it."""
         try:
             self._answer = self._step() if what == _STEP else {}
             if what != _STEP:
@@ -297,11 +306,11 @@ class _Episodes:
             self._answer = error
 
     def answer(self) -> Infos | Exception:
-        """What it has to say of that, or why it could not be done."""
+        """The infos after the last `tell`, or its error."""
         return self._answer
 
     def end(self) -> None:
-        """This process goes on."""
+        """Do nothing: this is the process of the caller."""
 
     def _begin(self, i: int, seed: int | None = None) -> None:
         shared = self._shared
@@ -309,21 +318,24 @@ class _Episodes:
         shared.rewards[i] = shared.terminated[i] = shared.truncated[i] = 0.0
 
     def _step(self) -> Infos:
-        shared, infos = self._shared, {}
+        shared = self._shared
+        infos = {}
         for i, env in enumerate(self._envs):
             if shared.terminated[i] or shared.truncated[i]:
                 self._begin(i)
                 continue
             seen, reward, terminated, truncated, info = env.step(shared.actions[i])
-            shared.seen[i], shared.rewards[i] = seen, reward
+            shared.seen[i] = seen
+            shared.rewards[i] = reward
             if terminated or truncated:
-                shared.terminated[i], shared.truncated[i] = terminated, truncated
+                shared.terminated[i] = terminated
+                shared.truncated[i] = truncated
                 infos[self.part.rows.start + i] = info
         return infos
 
 
 class _Worker:
-    """A process that flies some of the episodes. Told anything, it has to be asked for its answer."""
+    """A process that flies some of the episodes. After each `tell`, call `answer`."""
 
     def __init__(self, part: _Part) -> None:
         self.part = part
@@ -335,11 +347,11 @@ class _Worker:
         far_end.close()
 
     def tell(self, what: bytes) -> None:
-        with contextlib.suppress(OSError):  # it has ended: its answer will say so
+        with contextlib.suppress(OSError):  # the process has ended: `answer` returns the error
             self._line.send_bytes(what)
 
     def answer(self) -> Infos | Exception:
-        """What it has to say, or why it could not go on."""
+        """The infos after the last `tell`, or the error that ended it."""
         try:
             said = self._line.recv_bytes()
         except (EOFError, OSError):
@@ -354,8 +366,8 @@ class _Worker:
 
 
 def _serve(line: Connection, part: _Part) -> None:
-    """What a worker does: fly when told to, until nobody is there to tell it."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # it is for the process that gives the orders
+    """The loop of a worker: fly after each message, until the process of the caller has gone."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process of the caller
     episodes = _Episodes(part)
     with contextlib.suppress(EOFError, OSError):
         while True:
@@ -365,7 +377,7 @@ def _serve(line: Connection, part: _Part) -> None:
 
 
 def _numbers(name: str, given: ArrayLike, shape: tuple[int, ...]) -> Vector:
-    """Real numbers of a shape, as they are given; BadInput for anything else."""
+    """The given numbers, real and of this shape. Raises BadInput for anything else."""
     try:
         array = np.asarray(given)
         numbers = None if array.dtype.kind not in "fiub" else np.ascontiguousarray(array, np.float64)
@@ -382,7 +394,7 @@ def _numbers(name: str, given: ArrayLike, shape: tuple[int, ...]) -> Vector:
 
 
 def _seed(given: object) -> int:
-    """A whole number of at least 0, NumPy's own among them."""
+    """A whole number of at least 0, also one of NumPy."""
     try:
         seed = index(given)  # type: ignore[arg-type]
     except TypeError:

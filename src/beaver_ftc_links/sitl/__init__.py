@@ -1,11 +1,13 @@
-"""Under an autopilot: the physics end of ArduPilot's JSON interface and of PX4's simulator interface.
+"""Flights under an autopilot: the simulator in the JSON interface of ArduPilot and the MAVLink of PX4.
 
     autopilot  <- datagrams or TCP ->  endpoint (serve)  ->  protocol (ardupilot, px4)  ->  vehicle  ->  loop
 
-`protocol` classes know the packets and the lockstep and have no socket: bytes in, bytes out. `vehicle` is the
-flight: outputs in, an instant out; `outputs` makes deflections of outputs. `link` counts what came in and how
-quickly it was answered. `telling` puts in words what the diagnosis finds, `failures` breaks what a MAVLink
-command asks for, `mavlink` carries both beside the protocol. `serve` joins them and writes the result.
+- `ardupilot`, `px4`: packets and lockstep, without a socket: bytes in, bytes out
+- `vehicle`: the flight, from outputs of the autopilot to an instant; `outputs`: from outputs to deflections
+- `link`: counts of packets, and times of answers
+- `telling`: texts on the results of the diagnosis; `failures`: faults by MAVLink commands; `mavlink` carries
+  both, in addition to the protocol
+- `serve`: joins all, and returns the result
 """
 
 from enum import StrEnum

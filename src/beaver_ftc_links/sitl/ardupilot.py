@@ -1,13 +1,16 @@
-"""ArduPilot's JSON interface: datagrams in, JSON out, in lockstep. No socket: see `serve`.
+"""The JSON interface of ArduPilot: datagrams in, JSON out, in lockstep. The socket is in `serve`.
 
-A datagram is little-endian: magic, frame rate Hz, frame count, pulses in us [ArduPilot, libraries/SITL/
-examples/JSON/readme.md]. The answer is one line of JSON between two newlines. A reader looks for the
-first occurrence of a key as text, takes what stands right behind the colon, and a vector as `[a,b,c]`
-[libraries/SITL/SIM_JSON.cpp]: so no spaces, and a key that is part of another stands before it.
+A datagram is little-endian: magic number, frame rate in Hz, frame count, pulses in us [ArduPilot,
+libraries/SITL/examples/JSON/readme.md]. The answer is one line of JSON between two newlines. ArduPilot
+searches the first occurrence of a key as text, and reads the value directly behind the colon, a vector as
+`[a,b,c]` [libraries/SITL/SIM_JSON.cpp]. So the line has no spaces, and a key that is part of another one
+precedes it.
 
-The count rises with each answer received. A count that comes again is a packet sent again, since its answer
-was lost: it is answered, not flown. A lower one is late, unless it is said again: nobody repeats what has
-been answered, so that is a count restarted, of an autopilot started again. So is 0 or 1, long after.
+The autopilot increases the count with each answer that it receives:
+
+- The same count again: the answer was lost. It is sent again, and no frame is flown.
+- A lower count: the packet is late, and gets no answer. If the same lower count comes twice in turn, or if 0
+  or 1 comes after more than LATE frames, the autopilot has restarted.
 """
 
 import json
@@ -20,12 +23,12 @@ from beaver_ftc_links.sitl.link import Link
 from beaver_ftc_links.sitl.vehicle import Instant, Vehicle
 
 _HEAD = struct.Struct("<HHI")
-FORMS = {18458: struct.Struct("<16H"), 29569: struct.Struct("<32H")}  # by magic: the pulses
-LATE = 64  # frames: so far back a packet may have been overtaken
+FORMS = {18458: struct.Struct("<16H"), 29569: struct.Struct("<32H")}  # magic number -> pulses
+LATE = 64  # a packet is at most so many frames late
 
 
 class Packet(NamedTuple):
-    """A datagram: frames a second, number of the frame, pulses in us."""
+    """A datagram: frame rate, Hz; number of the frame; pulses, us."""
 
     rate_hz: int
     number: int
@@ -33,7 +36,7 @@ class Packet(NamedTuple):
 
 
 def decoded(datagram: bytes) -> Packet | None:
-    """The packet in a datagram, or None where it is none."""
+    """The packet in a datagram; None if there is none."""
     if len(datagram) < _HEAD.size:
         return None
     magic, rate_hz, count = _HEAD.unpack_from(datagram)
@@ -44,9 +47,10 @@ def decoded(datagram: bytes) -> Packet | None:
 
 
 def encoded(now: Instant) -> bytes:
-    """The answer: what the autopilot needs, then what it may use. SI, radians, see `Instant`.
+    """The answer. SI, radians, as in `Instant`.
 
-    airspeed: true. windvane: the apparent wind, clockwise from ahead. rng_1: the height above its ground.
+    airspeed: true airspeed. windvane: apparent wind, clockwise from ahead. rng_1: height above the ground of
+    the autopilot.
     """
     said = {
         "timestamp": now.t_s, "imu": {"gyro": now.gyro, "accel_body": now.force}, "position": now.position,
@@ -57,22 +61,24 @@ def encoded(now: Instant) -> bytes:
 
 
 class Ardupilot:
-    """One endpoint: the first peer's packets are flown, those of others counted.
+    """The protocol. The packets of the first peer are flown, those of others are counted.
 
-    complaint: why no flight can be begun, in a line; empty where one can.
+    complaint: the reason why the last flight could not begin, as a line; empty without one.
     """
 
     def __init__(self, vehicle: Vehicle, link: Link) -> None:
-        self._vehicle, self._link = vehicle, link
+        self._vehicle = vehicle
+        self._link = link
         self._peer: Hashable = None
-        self._last = -1  # count of the frame flown last; -1: none
-        self._again = -1  # a count that came late
+        self._last = -1  # count of the last flown frame; -1: none
+        self._again = -1  # count of the last late packet; -1: none since the last flown frame
         self._answer: bytes | None = None
         self.complaint = ""
 
     def take(self, datagram: bytes, peer: Hashable, now_s: float) -> bytes | None:
-        """What to answer to a datagram, if anything. peer: whose it is; now_s: any clock that runs on."""
-        counts, packet = self._link.counts, decoded(datagram)
+        """The answer to a datagram, if there is one. peer: its sender; now_s: time of a monotonic clock."""
+        counts = self._link.counts
+        packet = decoded(datagram)
         if packet is None:
             counts["malformed"] += 1
             return None
@@ -94,13 +100,13 @@ class Ardupilot:
         return self._fly(packet, now_s)
 
     def _may_take_over(self, packet: Packet, now_s: float) -> bool:
-        """Whether somebody new may fly: the first, or an autopilot started again, from another port, once
-        nothing has come from the old one for a while."""
+        """Whether a new peer may fly: the first one, or one that begins to count when nothing has come from
+        the old one for LONG_S, as an autopilot that restarts with another port."""
         silent = self._link.silent_s(now_s) > self._link.LONG_S
         return self._peer is None or (packet.number <= 1 and silent)
 
     def _is_restart(self, packet: Packet, peer: Hashable) -> bool:
-        """Whether the count has restarted, or at all."""
+        """Whether the packet begins a flight: the first of its peer, or of a restarted count."""
         if self._last < 0 or peer != self._peer:
             return True
         starts = packet.number <= 1 and self._last > LATE
@@ -117,7 +123,8 @@ class Ardupilot:
         return True
 
     def _fly(self, packet: Packet, now_s: float) -> bytes | None:
-        self._last, self._again = packet.number, -1
+        self._last = packet.number
+        self._again = -1
         self._link.hear(now_s)
         if self._vehicle.over:
             return None

@@ -1,6 +1,6 @@
-"""MAV_CMD_INJECT_FAILURE: which of a scenario's faults a MAVLink command asks for [MAVLink, common.xml, 420].
+"""MAV_CMD_INJECT_FAILURE: faults by a MAVLink command [MAVLink, common.xml, 420].
 
-param1 FAILURE_UNIT, param2 FAILURE_TYPE, param3 which of them: of servos the output's number, 0 all.
+param1: FAILURE_UNIT. param2: FAILURE_TYPE. param3: for servos the number of the output, 0 for all.
 """
 
 from collections.abc import Mapping
@@ -12,11 +12,15 @@ from beaver_ftc.scenario.faults import TYPES
 from beaver_ftc_links.sitl.vehicle import Flown
 
 COMMAND = 420
-ACCEPTED, DENIED, UNSUPPORTED = 0, 2, 3  # MAV_RESULT
+# MAV_RESULT.
+ACCEPTED = 0
+DENIED = 2
+UNSUPPORTED = 3
 SERVO = 102  # FAILURE_UNIT_SYSTEM_SERVO
-SENSORS = {0: ("p", "q", "r"), 1: ("ax", "ay", "az"), 3: ("altitude",), 8: ("V", "qdyn")}  # by FAILURE_UNIT
+# FAILURE_UNIT -> instruments.
+SENSORS = {0: ("p", "q", "r"), 1: ("ax", "ay", "az"), 3: ("altitude",), 8: ("V", "qdyn")}
 OK = 0  # FAILURE_TYPE: repaired
-# By FAILURE_TYPE: off, stuck, wrong, slow; garbage is noise of an instrument and an oscillation of a servo.
+# FAILURE_TYPE -> fault.
 OF_SERVOS: Mapping[int, dict[str, Any]] = {
     row.mavlink[0]: {"type": kind, **row.mavlink[1]} for kind, row in TYPES.items() if row.mavlink
 }
@@ -28,8 +32,8 @@ OF_SENSORS: Mapping[int, dict[str, Any]] = {
 
 
 def inject(sim: Flown, channels: ChannelsSection, params: tuple[float, float, float]) -> tuple[int, str]:
-    """Break or repair what these parameters ask for, from the next frame on; returns the MAV_RESULT and what
-    was done, in words."""
+    """Inject the fault with these parameters, or repair it, from the next frame on. Returns the MAV_RESULT
+    and a text on the fault."""
     unit, kind, which = (round(value) if abs(value) < 1e6 else -1 for value in params)
     places = _places(unit, which, sim, channels)
     faults = OF_SERVOS if unit == SERVO else OF_SENSORS

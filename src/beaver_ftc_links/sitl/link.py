@@ -1,11 +1,11 @@
-"""What came in over the wire, and how quickly it was answered: counts and two histograms, of fixed size."""
+"""Packets of an autopilot, and times of the answers: counts, and two histograms of fixed size."""
 
 from bisect import bisect_left
 from collections import Counter
 from math import sqrt
 from typing import Any
 
-# What is counted, and what the verdict calls it.
+# Key of each count -> words in the verdict.
 COUNTED = {
     "frames": "frames flown",
     "repeated": "repeated, answered again and not flown",
@@ -17,19 +17,25 @@ COUNTED = {
     "off_rate": "of a rate that is no whole number of JSBSim frames",
     "silences": "silences of more than a second",
 }
-_LEAST_S, _PER_DECADE, _DECADES = 1e-6, 60, 7  # bins of 4 % from 1 us to 10 s
+# Bins of 4 % from 1 us to 10 s.
+_LEAST_S = 1e-6
+_PER_DECADE = 60
+_DECADES = 7
 
 
 class Times:
-    """How long something took, s, many times over: quantiles to 4 %, the mean, the spread, the largest."""
+    """Statistics of durations, s: quantiles to 4 %, mean, standard deviation, largest."""
 
     def __init__(self) -> None:
         self._ends = [_LEAST_S * 10.0 ** (i / _PER_DECADE) for i in range(_PER_DECADE * _DECADES)]
         self._counts = [0] * (len(self._ends) + 1)
-        self.count, self.largest, self._sum, self._squares = 0, 0.0, 0.0, 0.0
+        self.count = 0
+        self.largest = 0.0
+        self._sum = 0.0
+        self._squares = 0.0
 
     def add(self, time_s: float) -> None:
-        """Once more."""
+        """Add a duration."""
         self._counts[bisect_left(self._ends, time_s)] += 1
         self.count += 1
         self.largest = max(self.largest, time_s)
@@ -37,8 +43,9 @@ class Times:
         self._squares += time_s * time_s
 
     def quantile(self, share: float) -> float:
-        """The time that this share of all took at most, s: the end of its bin, or the largest."""
-        due, seen = share * self.count, 0
+        """The quantile for this share, s: the end of its bin, or the largest duration if that is shorter."""
+        due = share * self.count
+        seen = 0
         for end, count in zip(self._ends, self._counts, strict=False):
             seen += count
             if count and seen >= due:
@@ -59,18 +66,19 @@ class Times:
 
 
 class Link:
-    """The counts of one endpoint; they go on when the flight restarts."""
+    """The counts of an endpoint, also over restarts of the flight. LONG_S: a longer gap is a silence."""
 
-    LONG_S = 1.0  # a silence
+    LONG_S = 1.0
 
     def __init__(self) -> None:
         self.counts: Counter[str] = Counter(dict.fromkeys(COUNTED, 0))
-        self.latency, self.interval = Times(), Times()
+        self.latency = Times()
+        self.interval = Times()
         self._received_s: float | None = None
         self.longest_s = 0.0
 
     def hear(self, now_s: float) -> None:
-        """A new frame came in."""
+        """Count a new frame at this time."""
         if self._received_s is not None:
             gap_s = now_s - self._received_s
             self.longest_s = max(self.longest_s, gap_s)
@@ -81,12 +89,13 @@ class Link:
         self._received_s = now_s
 
     def silent_s(self, now_s: float) -> float:
-        """For how long nothing new has come."""
+        """Time since the last new frame, s; 0 before the first."""
         return 0.0 if self._received_s is None else now_s - self._received_s
 
     def document(self) -> dict[str, Any]:
-        """All of it, for the metrics: counts, and times in ms."""
-        latency, interval = self.latency, self.interval
+        """The counts, and times in ms, for the metrics."""
+        latency = self.latency
+        interval = self.interval
         return {
             **self.counts,
             "latency_ms": {

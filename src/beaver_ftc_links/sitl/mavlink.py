@@ -1,5 +1,4 @@
-"""MAVLink: texts and answers packed, commands unpacked; and a UDP line to a ground station beside the
-protocol.
+"""MAVLink messages as bytes, and a UDP line to a ground station.
 
 Needs pymavlink: the extra `flights`.
 """
@@ -13,9 +12,9 @@ from beaver_ftc.documents import BadInput
 from beaver_ftc_links.sitl import failures
 from beaver_ftc_links.sitl.telling import Text
 
-Message = Any  # pymavlink makes its classes itself
+Message = Any  # pymavlink makes the classes at run time
 Inject = Callable[[tuple[float, float, float]], tuple[int, str]]
-TEXT = 50  # characters of one STATUSTEXT
+TEXT = 50  # largest number of characters in a STATUSTEXT
 SYSTEM = 1
 COMPONENT = 191  # MAV_COMP_ID_ONBOARD_COMPUTER
 HEARTBEAT_S = 1.0
@@ -23,7 +22,7 @@ MOST_BYTES = 4096
 
 
 def dialect() -> Any:
-    """pymavlink's module of the messages. Raises BadInput where it is not installed."""
+    """The module of pymavlink with the messages. Raises BadInput if it is not installed."""
     try:
         return import_module("pymavlink.dialects.v20.common")
     except ImportError:
@@ -31,20 +30,21 @@ def dialect() -> Any:
 
 
 class Mavlink:
-    """One end of a line: packs and unpacks. malformed: bytes or messages that were none, so far."""
+    """One end of a line. malformed: number of parts of the input so far that are no message."""
 
     def __init__(self) -> None:
-        self.messages, self.malformed = dialect(), 0
+        self.messages = dialect()
+        self.malformed = 0
         self._texts = 0
         self.begin()
 
     def begin(self) -> None:
-        """A new line: what has come of a message on an old one is let go."""
+        """Begin a new line, without the incomplete message of the old one."""
         self._mav = self.messages.MAVLink(None, srcSystem=SYSTEM, srcComponent=COMPONENT)
         self._mav.robust_parsing = True
 
     def pack(self, message: Message) -> bytes:
-        """Return a MAVLink message as bytes."""
+        """A message as bytes."""
         return bytes(message.pack(self._mav))
 
     def unpack(self, data: bytes) -> list[Message]:
@@ -55,7 +55,7 @@ class Mavlink:
         return sound
 
     def texts(self, said: Iterable[Text]) -> bytes:
-        """Return STATUSTEXT messages; a text that is too long for one message is split."""
+        """The texts as STATUSTEXT messages; a text that is too long for one is split."""
         packed = b""
         for _, severity, text in said:
             given = text.encode("ascii", "replace")
@@ -68,7 +68,7 @@ class Mavlink:
         return packed
 
     def obeyed(self, message: Message, inject: Inject) -> tuple[bytes, str]:
-        """What to answer to a message, and what was done in words: of MAV_CMD_INJECT_FAILURE, of no other."""
+        """The answer to a MAV_CMD_INJECT_FAILURE, and a text on the fault; both empty for another message."""
         if message.get_type() != "COMMAND_LONG" or message.command != failures.COMMAND:
             return b"", ""
         result, says = inject((message.param1, message.param2, message.param3))
@@ -78,7 +78,7 @@ class Mavlink:
 
 
 class GroundLine:
-    """Texts to a ground station over UDP, and its commands back; with a heartbeat a second of `now_s`."""
+    """Texts to a ground station over UDP, with a heartbeat each HEARTBEAT_S; and commands from it."""
 
     def __init__(self, host: str, port: int) -> None:
         self._mav = Mavlink()
@@ -98,8 +98,8 @@ class GroundLine:
             self._send(packed)
 
     def serve(self, now_s: float, inject: Inject) -> list[str]:
-        """Send a heartbeat if one is due; obey the commands that have come. Returns what was done, in
-        words."""
+        """Send a heartbeat if one is due, and execute the commands that have come. Returns a text for each.
+        now_s: time of a monotonic clock."""
         if now_s >= self._beat_s + HEARTBEAT_S:
             self._beat_s = now_s
             m = self._mav.messages
@@ -111,7 +111,7 @@ class GroundLine:
         while True:
             try:
                 data, _ = self._socket.recvfrom(MOST_BYTES)
-            except OSError:  # nothing is there, or nobody
+            except OSError:  # no datagram
                 return done
             for message in self._mav.unpack(data):
                 answer, says = self._mav.obeyed(message, inject)
@@ -122,7 +122,7 @@ class GroundLine:
     def _send(self, data: bytes) -> None:
         try:
             self._socket.sendto(data, self._to)
-        except OSError:  # nobody listens, or not now: the flight goes on
+        except OSError:  # no ground station: the flight goes on
             return
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""The flight on the live page: it looks on, breaks and repairs; the autopilot flies."""
+"""The flight on the live page, which shows it and can inject and repair faults; the autopilot flies."""
 
 import time
 from collections.abc import Callable
@@ -15,7 +15,7 @@ ALLOWED = ("break", "repair", "blow")
 
 
 class Watched(Session):
-    """A session around the vehicle's flight, which others begin and step."""
+    """A session of the live page for the flight of a vehicle, which the autopilot begins and steps."""
 
     def __init__(self, vehicle: Vehicle) -> None:
         self._vehicle = vehicle
@@ -26,8 +26,9 @@ class Watched(Session):
         self._frames = 0
 
     def has_restarted(self) -> bool:
-        """Whether it is another flight than at the last call; that is then taken up."""
-        flight, before = self._vehicle.flight, self._frames
+        """Whether the flight has restarted since the last call; the session then follows the new one."""
+        flight = self._vehicle.flight
+        before = self._frames
         restarted = flight is not self.sim or flight.frames < before
         if restarted:
             self._begin(self.scenario)
@@ -35,23 +36,26 @@ class Watched(Session):
         return restarted
 
     def notice(self) -> None:
-        """Notice what the frames since the last call have brought."""
+        """Note the faults and verdicts of the frames since the last call."""
         self._notice_faults()
         self._notice()
 
 
 class Shown(Flying):
-    """The flight process' side of the pipe where something else flies: `tick` is called between frames.
+    """The side of the flight process in the pipe to the live page. The endpoint calls `tick` between frames.
 
-    say: takes a line for people.
+    say: function that prints a line.
     """
 
     def __init__(self, pipe: Connection, session: Watched, say: Callable[[str], None]) -> None:
         super().__init__(pipe, session)
-        self._watched, self._say, self._next_s, self._there = session, say, 0.0, True
+        self._watched = session
+        self._say = say
+        self._next_s = 0.0
+        self._there = True
 
     def tick(self) -> None:
-        """Take what pages ask; tell them how it goes, as often as they draw."""
+        """Handle the requests of the pages, and send the state at the rate at which the pages draw."""
         now_s = time.monotonic()
         if now_s < self._next_s or not self._there:
             return

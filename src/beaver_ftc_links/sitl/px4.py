@@ -1,13 +1,13 @@
-"""PX4's simulator interface: MAVLink both ways, in lockstep. No socket: see `serve`.
+"""The simulator interface of PX4: MAVLink in both directions, in lockstep. The socket is in `serve`.
 
-Out HIL_SENSOR each frame, HIL_GPS ten times and HIL_STATE_QUATERNION fifty times a second; in
-HIL_ACTUATOR_CONTROLS [PX4, docs/en/simulation, "PX4 simulator interface"; SimulatorMavlink.cpp]. PX4 has no
-clock of its own then: HIL_SENSOR's stamp is its time, and its answer bears that stamp. So an answer with the
-stamp of the HIL_SENSOR sent last is flown, one with an earlier stamp has been answered already: it is
-counted, neither flown nor answered, or two of each would be under way for ever.
+Sent: HIL_SENSOR in each frame, HIL_GPS ten times and HIL_STATE_QUATERNION fifty times a second. Received:
+HIL_ACTUATOR_CONTROLS [PX4, docs/en/simulation, "PX4 simulator interface"; SimulatorMavlink.cpp]. The time of
+PX4 is the stamp of HIL_SENSOR, and its answer has the same stamp. Only an answer with the stamp of the last
+HIL_SENSOR is flown. One with an earlier stamp was answered before: it is only counted, since otherwise two
+messages of each kind would be under way for ever.
 
-An autopilot that starts needs time to pass before it answers. Until its first answer time runs by the clock,
-and until it is armed for the first time the law `nominal` flies, level.
+An autopilot that starts needs time before it answers. Until its first answer, time passes by the clock. Until
+it is armed for the first time, the law `nominal` flies level, or the aircraft stands on the ground.
 """
 
 from collections.abc import Iterable
@@ -26,31 +26,46 @@ from beaver_ftc_links.sitl.vehicle import Instant, Vehicle
 ARMED = 128  # bit of HIL_ACTUATOR_CONTROLS.mode: MAV_MODE_FLAG_SAFETY_ARMED
 BOOT_US = 1_000_000  # stamp of the first instant: 0 means none
 CHANNELS = 16
-GPS_HZ, STATE_HZ, SLOW_HZ = 10.0, 50.0, 50.0
-INERTIAL, MAGNETIC, AIR = 0b111111, 0b111000000, 0b1111000000000  # bits of fields_updated
+GPS_HZ = 10.0
+STATE_HZ = 50.0
+SLOW_HZ = 50.0
+# Bits of fields_updated.
+INERTIAL = 0b111111
+MAGNETIC = 0b111000000
+AIR = 0b1111000000000
 # The Earth's field where all flights start, 45 N 0 E: declination, inclination, deg; gauss [WMM, 2023].
-DECLINATION_DEG, INCLINATION_DEG, FIELD_GAUSS = 1.2, 60.5, 0.467
+DECLINATION_DEG = 1.2
+INCLINATION_DEG = 60.5
+FIELD_GAUSS = 0.467
 NO_YAW = 0
 
 Message = Any
 
 
 class Px4:
-    """One endpoint. armed: the autopilot has been armed in this flight."""
+    """The protocol. armed: whether the autopilot was armed in this flight. done: a text for each command."""
 
     def __init__(self, vehicle: Vehicle, link: Link, mavlink: Mavlink, inject: Inject) -> None:
-        self._vehicle, self._link, self._mav, self._inject = vehicle, link, mavlink, inject
+        self._vehicle = vehicle
+        self._link = link
+        self._mav = mavlink
+        self._inject = inject
         self._connections = 0
-        self.done: list[str] = []  # what commands have had done, in words
+        self.done: list[str] = []
         self._wait()
 
     def _wait(self) -> None:
-        """An autopilot is new: it has said nothing yet."""
-        self.armed, self._answering = False, False
-        self._frame, self._sent_us, self._last, self._said_s = 0, 0, b"", 0.0
+        """Begin with an autopilot that has not answered yet."""
+        self.armed = False
+        self._answering = False
+        self._frame = 0
+        self._sent_us = 0
+        self._last = b""
+        self._said_s = 0.0
 
     def connect(self, now_s: float) -> bytes:
-        """A new connection is an autopilot started again, and so is the flight. Returns what to send."""
+        """Begin a connection. A further one restarts the flight, since the autopilot has restarted. Returns
+        the first messages."""
         self._connections += 1
         self._mav.begin()
         self._wait()
@@ -60,8 +75,9 @@ class Px4:
         return self._say(now_s)
 
     def take(self, data: bytes, now_s: float) -> bytes:
-        """What to send after these bytes have come."""
-        before, answers = self._mav.malformed, b""
+        """The answer to these bytes."""
+        before = self._mav.malformed
+        answers = b""
         for message in self._mav.unpack(data):
             if message.get_type() == "HIL_ACTUATOR_CONTROLS":
                 answers += self._controls(message, now_s)
@@ -73,8 +89,8 @@ class Px4:
         return answers
 
     def tick(self, now_s: float, step_s: float) -> bytes:
-        """What to send while nothing comes: time that passes while PX4 starts, a frame each step_s; later,
-        after a second, the last instant again. The flight stands meanwhile."""
+        """The bytes to send while nothing comes. While PX4 starts: a new frame each step_s. Later: after
+        LONG_S, the last HIL_SENSOR again, and the flight waits."""
         if self._answering:
             if now_s - self._said_s < self._link.LONG_S:
                 return b""
@@ -86,7 +102,8 @@ class Px4:
         return self._say(now_s)
 
     def _controls(self, message: Message, now_s: float) -> bytes:
-        stamp_us, counts = int(message.time_usec), self._link.counts
+        stamp_us = int(message.time_usec)
+        counts = self._link.counts
         if stamp_us != self._sent_us:
             counts["repeated" if stamp_us == self._frame_before_us else "late"] += 1
             return b""
@@ -107,9 +124,12 @@ class Px4:
         return BOOT_US + round(1e6 * frame / self._vehicle.packets_hz)
 
     def _say(self, now_s: float) -> bytes:
-        """The instant, for the next answer to bear its stamp."""
-        now, frame, hz = self._vehicle.instant(), self._frame, self._vehicle.packets_hz
-        self._sent_us, self._said_s = self._stamp_us(frame), now_s
+        """The messages of the last instant; the next answer must have their stamp."""
+        now = self._vehicle.instant()
+        frame = self._frame
+        hz = self._vehicle.packets_hz
+        self._sent_us = self._stamp_us(frame)
+        self._said_s = now_s
         self._frame += 1
         m = self._mav.messages
         packed = b""
@@ -117,7 +137,7 @@ class Px4:
             packed += self._mav.pack(gps(m, now, self._sent_us))
         if _due(frame, hz, STATE_HZ):
             packed += self._mav.pack(state(m, now, self._sent_us))
-        # what it waits for comes last
+        # PX4 waits for HIL_SENSOR: it comes last.
         self._last = self._mav.pack(sensor(m, now, self._sent_us, _due(frame, hz, SLOW_HZ)))
         return packed + self._last
 
@@ -128,7 +148,7 @@ def _due(frame: int, hz: float, wanted_hz: float) -> bool:
 
 
 def sensor(m: Any, now: Instant, stamp_us: int, all_fields: bool) -> Message:
-    """HIL_SENSOR: inertial each time, the others when `all_fields`."""
+    """HIL_SENSOR: the inertial fields, and with all_fields the others."""
     updated = INERTIAL | MAGNETIC | AIR if all_fields else INERTIAL
     magnetic = magnetic_gauss(now.true_attitude) if all_fields else (0.0, 0.0, 0.0)
     pressure_hpa, celsius = standard_air(now.altitude_m)
@@ -139,7 +159,7 @@ def sensor(m: Any, now: Instant, stamp_us: int, all_fields: bool) -> Message:
 
 
 def gps(m: Any, now: Instant, stamp_us: int) -> Message:
-    """HIL_GPS: a good fix, of the truth."""
+    """HIL_GPS: a good fix, with the true values."""
     north, east, down = _int16(now.velocity, 100.0)
     course = round(100.0 * degrees(atan2(east, north))) % 36000
     return m.MAVLink_hil_gps_message(
@@ -148,8 +168,9 @@ def gps(m: Any, now: Instant, stamp_us: int) -> Message:
 
 
 def state(m: Any, now: Instant, stamp_us: int) -> Message:
-    """HIL_STATE_QUATERNION: the truth, for logs."""
-    velocity, force = _int16(now.velocity, 100.0), _int16(now.force, 1000.0 / GRAVITY_MPS2)
+    """HIL_STATE_QUATERNION: the true state, for logs."""
+    velocity = _int16(now.velocity, 100.0)
+    force = _int16(now.force, 1000.0 / GRAVITY_MPS2)
     indicated_mps = sqrt(max(2.0 * now.qdyn_pa / 1.225, 0.0))
     indicated, speed = (min(round(100.0 * v), 65535) for v in (indicated_mps, now.airspeed_mps))
     return m.MAVLink_hil_state_quaternion_message(
@@ -158,7 +179,7 @@ def state(m: Any, now: Instant, stamp_us: int) -> Message:
 
 
 def _int16(values: Iterable[float], scale: float) -> list[int]:
-    """Scaled values, the largest and the smallest that a field holds where they exceed these."""
+    """Scaled values, rounded and limited to those of 16 bits."""
     return [max(min(round(scale * value), 32767), -32768) for value in values]
 
 
@@ -180,7 +201,8 @@ def quaternion(phi: float, theta: float, psi: float) -> list[float]:
 
 def magnetic_gauss(attitude: tuple[float, ...]) -> tuple[float, float, float]:
     """The Earth's field in body axes, gauss."""
-    declination, inclination = radians(DECLINATION_DEG), radians(INCLINATION_DEG)
+    declination = radians(DECLINATION_DEG)
+    inclination = radians(INCLINATION_DEG)
     level = cos(inclination)
     earth = np.array([level * cos(declination), level * sin(declination), sin(inclination)])
     x, y, z = (body_axes(*attitude) @ earth * FIELD_GAUSS).tolist()

@@ -1,4 +1,4 @@
-"""The endpoint: sockets, the clock, the end; and what the flight leaves behind."""
+"""The endpoint for an autopilot: sockets, real time, the end of the flight, and its result."""
 
 import contextlib
 import select
@@ -26,10 +26,10 @@ from beaver_ftc_live.page.serve import beside
 from beaver_ftc_live.page.session import ready_for_hands
 
 LOOPBACK = "127.0.0.1"
-PX4_HZ = 250.0  # of HIL_SENSOR, where nobody says otherwise
-MOST_BYTES = 65536
-WAIT_S = 0.25  # at most, for whatever may come
-HANG_UP_S = 0.5  # at most, for the other end to hang up too
+PX4_HZ = 250.0  # rate of HIL_SENSOR without the option --rate
+MOST_BYTES = 65536  # largest number of bytes that are received at once
+WAIT_S = 0.25  # longest wait for a packet
+HANG_UP_S = 0.5  # longest wait until the autopilot closes the connection, too
 NAMES = {Protocol.ardupilot: "ArduPilot", Protocol.px4: "PX4"}
 
 Say = Callable[[str], None]
@@ -37,10 +37,11 @@ Say = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Options:
-    """How the endpoint is set up.
+    """The settings of the endpoint.
 
-    port 0: any. speed: times real time, 0 as fast as the autopilot answers. ground: host and port of a ground
-    station. page: port of the live page, 0 any, None without. The others are `Vehicle`'s.
+    port: 0 for any. speed: multiple of real time, 0: as fast as the autopilot answers. ground: host and port
+    of a ground station. page: port of the live page, 0 for any, None without a page. The others are those of
+    `Vehicle`.
     """
 
     protocol: Protocol
@@ -56,17 +57,18 @@ class Options:
 
 @dataclass
 class Pace:
-    """Holds answers back until their time. speed: times real time, 0 not at all. late_s: the largest
-    delay."""
+    """Delays answers to real time. speed: multiple of real time; 0: no delay. late_s: the largest time by
+    which an answer was late."""
 
     speed: float
     late_s: float = 0.0
     _from: tuple[float, float] = field(default=(0.0, inf))  # of the clock, of the flight, s
 
     def wait(self, t_s: float, ended: Callable[[], bool] = lambda: False) -> None:
-        """Until flight time t_s is due; a flight restarted restarts here, and what is late is let go.
+        """Wait until the flight time t_s is due. After a restart of the flight, or a delay above WAIT_S, time
+        counts from this instant.
 
-        ended: whether there is nothing to wait for any more; it is called every WAIT_S.
+        ended: function that returns whether the wait is to end; it is called every WAIT_S.
         """
         if not self.speed:
             return
@@ -83,16 +85,17 @@ class Pace:
 
 
 class Endpoint:
-    """What both protocols share: the flight, what is said of it, and when it ends.
-
-    say: takes a line for people.
-    """
+    """The part that both protocols share: the flight, the texts on it, and its end. say: function that prints
+    a line."""
 
     def __init__(self, scenario: Scenario, options: Options, say: Say) -> None:
         pulses = options.protocol is Protocol.ardupilot
         rate_hz = PX4_HZ if options.rate_hz is None and not pulses else options.rate_hz
-        self.options, self._say, self.ended = options, say, False
-        self.link, self._teller = Link(), Teller()
+        self.options = options
+        self._say = say
+        self.ended = False
+        self.link = Link()
+        self._teller = Teller()
         self.vehicle = Vehicle(scenario, pulses, rate_hz, options.hold_s, options.ground_m)
         if not pulses:
             self.vehicle.outputs.check(px4.CHANNELS)
@@ -107,8 +110,8 @@ class Endpoint:
         self._page = Shown(pipe, Watched(self.vehicle), self._say)
 
     def after(self, began_s: float) -> list[Text]:
-        """What is new after an answer, whose making began at that time of perf_counter; the answer then waits
-        for its time."""
+        """The new texts, after the answer of a frame is made and its time has come. began_s: time of
+        perf_counter at which the answer was begun."""
         if self.link.counts["resets"] != self._resets:
             self._resets = self.link.counts["resets"]
             self._teller.begin()
@@ -125,7 +128,7 @@ class Endpoint:
         return news
 
     def listen(self) -> None:
-        """Obey the ground station and the page, and let them know how it goes."""
+        """Execute the commands of the ground station and the page, and send the state to the page."""
         if self._page is not None:
             self._page.tick()
         if self._ground is not None:
@@ -133,16 +136,16 @@ class Endpoint:
                 self._say(says)
 
     def inject(self, params: tuple[float, float, float]) -> tuple[int, str]:
-        """Break or repair what a MAVLink command asks for."""
+        """Inject or repair a fault by the parameters of a MAVLink command (`failures.inject`)."""
         return failures.inject(self.vehicle.flight, self.vehicle.outputs.channels, params)
 
     @property
     def over(self) -> bool:
-        """Whether there is nothing left to answer."""
+        """Whether the flight has ended, by itself or by a signal."""
         return self.ended or self.vehicle.over
 
     def result(self) -> Flight:
-        """What the flight has yielded, with a section `link` in its metrics."""
+        """The flight with its metrics, which have a section `link`."""
         landed = self.vehicle.flight.land()
         found = self._without_certainty(self._ended_early(Metrics.of(landed.metrics)))
         found = replace(
@@ -167,7 +170,7 @@ class Endpoint:
         })  # fmt: skip
 
     def _ended_early(self, found: Metrics) -> Metrics:
-        """A flight that somebody ended before its time has not done what is expected of it."""
+        """The metrics, which a flight that a signal ended before its time does not pass."""
         if not self.ended or self.vehicle.over:
             return found
         at_s = self.vehicle.flight.t_s
@@ -175,8 +178,9 @@ class Endpoint:
         return replace(found, interrupted_s=at_s, passed=False)
 
     def _without_certainty(self, found: Metrics) -> Metrics:
-        """No alarm was certain of what broke before the diagnosis began, near the ground."""
-        from_s, fault = self.vehicle.flight.listens_from_s, found.fault
+        """The metrics, without a guaranteed delay for a fault before the diagnosis began near the ground."""
+        from_s = self.vehicle.flight.listens_from_s
+        fault = found.fault
         if from_s is None:
             self._say("the diagnosis never began: near the ground nothing is diagnosed")
         if from_s is None or (fault and fault.at_s < from_s):
@@ -184,16 +188,16 @@ class Endpoint:
         return found
 
     def close(self) -> None:
-        """Hang up."""
+        """Close the line to the ground station."""
         if self._ground is not None:
             self._ground.close()
 
 
 def serve(scenario: Scenario, options: Options, say: Say) -> Flight:
-    """Fly a scenario under the autopilot that calls, until the flight or SIGINT or SIGTERM ends it.
+    """Fly a scenario under the autopilot that connects, until the flight, SIGINT or SIGTERM ends it.
 
-    say: takes lines for people: the address, what is left out of the scenario, what the diagnosis finds.
-    Raises BadInput for an address that cannot be had, or a flight that cannot be begun.
+    say: function that prints a line: the address, the keys that are left out, the results of the diagnosis.
+    Raises BadInput for an address that is not available, or a flight that cannot begin.
     """
     scenario, left_out = without_reference(scenario)
     for line in left_out:
@@ -210,7 +214,7 @@ def serve(scenario: Scenario, options: Options, say: Say) -> Flight:
         host, port = listener.getsockname()[:2]
         say(f"{NAMES[options.protocol]}: {'UDP' if kind == socket.SOCK_DGRAM else 'TCP'} {host}:{port}")
         try:
-            with _until_told(endpoint):
+            with _ended_by_signal(endpoint):
                 (_serve_datagrams if kind == socket.SOCK_DGRAM else _serve_stream)(endpoint, listener, say)
             return endpoint.result()
         finally:
@@ -219,7 +223,7 @@ def serve(scenario: Scenario, options: Options, say: Say) -> Flight:
 
 @contextlib.contextmanager
 def _listening(options: Options, kind: int) -> Iterator[socket.socket]:
-    """A socket at the address asked for."""
+    """A socket at the address in the options."""
     port = PORTS[options.protocol] if options.port is None else options.port
     with socket.socket(socket.AF_INET, kind) as listener:
         if kind == socket.SOCK_STREAM:
@@ -234,14 +238,14 @@ def _listening(options: Options, kind: int) -> Iterator[socket.socket]:
 
 
 @contextlib.contextmanager
-def _until_told(endpoint: Endpoint) -> Iterator[None]:
-    """SIGINT and SIGTERM end the flight in good order."""
+def _ended_by_signal(endpoint: Endpoint) -> Iterator[None]:
+    """Context in which SIGINT and SIGTERM end the flight, so that its result is still written."""
 
     def end(*_: Any) -> None:
         endpoint.ended = True
 
     before = {}
-    with contextlib.suppress(ValueError):  # not the main thread: it ends in its own way
+    with contextlib.suppress(ValueError):  # not the main thread, which alone may set handlers
         before = {number: signal.signal(number, end) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         yield
@@ -251,7 +255,8 @@ def _until_told(endpoint: Endpoint) -> Iterator[None]:
 
 
 def _serve_datagrams(endpoint: Endpoint, listener: socket.socket, say: Say) -> None:
-    protocol, complaint = Ardupilot(endpoint.vehicle, endpoint.link), ""
+    protocol = Ardupilot(endpoint.vehicle, endpoint.link)
+    complaint = ""
     listener.settimeout(WAIT_S)
     while not endpoint.over:
         try:
@@ -259,7 +264,7 @@ def _serve_datagrams(endpoint: Endpoint, listener: socket.socket, say: Say) -> N
         except TimeoutError:
             endpoint.listen()
             continue
-        except ConnectionError:  # the peer that was answered last has gone
+        except ConnectionError:  # the peer of the last answer has gone
             continue
         began_s = time.perf_counter()
         answer = protocol.take(datagram, peer, time.monotonic())
@@ -268,7 +273,7 @@ def _serve_datagrams(endpoint: Endpoint, listener: socket.socket, say: Say) -> N
             say(complaint)
         if answer is not None:
             endpoint.after(began_s)
-            with contextlib.suppress(OSError):  # the autopilot has gone: it will ask again, or another will
+            with contextlib.suppress(OSError):  # the autopilot has gone
                 listener.sendto(answer, peer)
 
 
@@ -290,7 +295,7 @@ def _serve_stream(endpoint: Endpoint, listener: socket.socket, say: Say) -> None
 def _serve_line(
     endpoint: Endpoint, protocol: Px4, mavlink: Mavlink, line: socket.socket, listener: socket.socket
 ) -> None:
-    """One connection, to its end. Another caller meanwhile is turned away."""
+    """Serve a connection to its end. A second one is closed meanwhile, and counted."""
     vehicle = endpoint.vehicle
     _send(line, protocol.connect(time.monotonic()), endpoint)
     while not endpoint.over:
@@ -316,7 +321,7 @@ def _serve_line(
 
 
 def _send(line: socket.socket, data: bytes, endpoint: Endpoint) -> None:
-    """Send all of it; a peer that does not read is waited for until somebody ends the flight."""
+    """Send all of the data; wait for a peer that does not read, unless the flight ends."""
     line.setblocking(False)
     left = memoryview(data)
     while left and not endpoint.ended:
@@ -327,13 +332,14 @@ def _send(line: socket.socket, data: bytes, endpoint: Endpoint) -> None:
 
 
 def _has_gone(line: socket.socket) -> bool:
-    """Whether the other end has hung up, and nothing it said before is left to be read."""
+    """Whether the other end has closed the connection, and all of its data are read."""
     readable, _, _ = select.select([line], [], [], 0.0)
     return bool(readable) and not line.recv(1, socket.MSG_PEEK)
 
 
 def _hang_up(line: socket.socket) -> None:
-    """Close a line of which the other end is to hear the last word: with words unread it would be reset."""
+    """Close a connection so that the other end still receives the last data: while its own data are unread,
+    the connection would be reset."""
     line.shutdown(socket.SHUT_WR)
     line.setblocking(False)
     until_s = time.monotonic() + HANG_UP_S

@@ -1,19 +1,23 @@
-"""What the diagnosis finds in flight, as short texts: MAVLink's STATUSTEXT, and lines for people."""
+"""Results of the diagnosis in flight as short texts, for STATUSTEXT of MAVLink and for the terminal."""
 
 from typing import Any, NamedTuple
 
 from beaver_ftc_links.sitl.vehicle import Flown
 from beaver_ftc_live.page.messages import verdict_in_words
 
-EMERGENCY, CRITICAL, WARNING, INFO = 0, 2, 4, 6  # MAV_SEVERITY
-MOST_KEPT = 200
-ESTIMATED_S = 1.0  # after a loss has been named, its size is said
+# MAV_SEVERITY.
+EMERGENCY = 0
+CRITICAL = 2
+WARNING = 4
+INFO = 6
+MOST_KEPT = 200  # largest number of texts in the metrics
+ESTIMATED_S = 1.0  # time from the name of a loss to the text on its size
 _PREFIX = "FDI: "
 _LOSS = "loss_of_effectiveness"
 
 
 class Text(NamedTuple):
-    """One finding: when, s of flight; MAV_SEVERITY; words."""
+    """A result: time of flight, s; MAV_SEVERITY; text."""
 
     t_s: float
     severity: int
@@ -21,20 +25,22 @@ class Text(NamedTuple):
 
 
 class Teller:
-    """Notices what is new in the verdict of a flight, from frame to frame."""
+    """Compares the verdict of a flight with that of the frame before. kept: the texts so far."""
 
     def __init__(self) -> None:
         self.kept: list[Text] = []
         self.begin()
 
     def begin(self) -> None:
-        """A flight begins: nothing has been said of it."""
+        """Forget the verdict and the texts of the flight before."""
         self._said: tuple[Any, ...] = (False, None, None, ())
-        self._lost, self._named_s, self._listening = False, -1.0, False
+        self._lost = False
+        self._named_s = -1.0
+        self._listening = False
         self.kept.clear()
 
     def news(self, sim: Flown) -> list[Text]:
-        """What is to be said of the frame just flown; mostly nothing."""
+        """The texts on the last frame; mostly none."""
         begins = bool(sim.listens_from_s) and not self._listening
         if not (begins or sim.alarmed or sim.departed):
             return []
@@ -45,7 +51,8 @@ class Teller:
         return texts
 
     def _new(self, sim: Flown) -> list[tuple[int, str]]:
-        verdict, found = sim.verdict, []
+        verdict = sim.verdict
+        found = []
         before = self._said
         open_between = tuple(dict.fromkeys(name.partition(":")[0] for name in verdict.candidates))
         self._said = now = verdict.detected, verdict.isolated, verdict.type, open_between

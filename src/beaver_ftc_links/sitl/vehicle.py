@@ -29,9 +29,13 @@ from beaver_ftc_links.sitl.outputs import Outputs, power_range
 if TYPE_CHECKING:
     from beaver_ftc.diagnosis import Detector
 
-SLOWEST_HZ, FASTEST_HZ = 20.0, 400.0  # rates of the diagnosis at which its promises are tested
+# Rates of the diagnosis at which its guarantees are tested.
+SLOWEST_HZ = 20.0
+FASTEST_HZ = 400.0
 FASTEST_PACKETS_HZ = 4000.0
-UP_M, DOWN_M = 5.0, 2.0  # height of the wheels at which the diagnosis begins after take-off, and ends
+# Height of the wheels at which the diagnosis begins after take-off, and at which it ends.
+UP_M = 5.0
+DOWN_M = 2.0
 SLOW_MPS = 10.0
 GUSTY_M = 609.6  # height above which a flight from the ground is diagnosed in declared turbulence
 WHOLE = 1e-6  # JSBSim frames: a number that differs by less from a whole one counts as whole
@@ -58,7 +62,8 @@ _AT = {name: i for i, name in enumerate(SENSORS)}
 
 
 class Instant(NamedTuple):
-    """What the autopilot receives. SI, radians; body axes forward, right, down; earth axes north, east, down.
+    """The measurements for the autopilot. SI, radians; body axes forward, right, down; earth axes north,
+    east, down.
 
     Readings of the instruments, with errors and faults, the same as for the diagnosis: gyro, specific force
     (without gravity), attitude (roll, pitch, yaw), airspeed, sideslip, dynamic pressure, altitude above sea
@@ -114,17 +119,19 @@ class Flown(Simulation):
 
     def _make_ready(self) -> None:
         super()._make_ready()
-        self._runs, self._engaged = 0, False  # JSBSim frames flown of the coming frame
+        self._runs = 0  # JSBSim frames of the next frame that are flown
+        self._engaged = False
         self.listens_from_s: float | None = 0.0
         self._diagnoses = True
-        self._fresh: Vector | None = None  # the record as assembled: what a diagnosis begins with
+        self._fresh: Vector | None = None  # the assembled record, with which a diagnosis begins
         self._slowest_mps = self.airframe.envelope.airspeed_mps[0]
         if self.airframe.file.ground is not None:
             self._lay_ground()
         self._begin()
         node = self._loop.plant.node
         self._nodes = [(node(name).get_double_value, factor) for name, factor in _NODES]
-        self._instruments, self._origin = Instruments(self._frame), FrameReadout(self._frame).origin
+        self._instruments = Instruments(self._frame)
+        self._origin = FrameReadout(self._frame).origin
 
     def _lay_ground(self) -> None:
         loop, frame, file = self._loop, self._frame, self.airframe.file
@@ -252,11 +259,11 @@ class Flown(Simulation):
 
 
 class Vehicle:
-    """The flight, begun at the rate the packets have, and restarted when they are.
+    """The flight of an autopilot, at the rate of its packets; it restarts when the packets do.
 
-    pulses: as `Outputs` has it. rate_hz: of the packets, whatever they say themselves. hold_s: so long the
-    law `nominal` flies first, level. ground_m: the autopilot's, above sea level; by itself 0, and of a
-    flight from the ground its altitude. log: keep one.
+    pulses: as in `Outputs`. rate_hz: rate of the packets; None: the rate that the packets state. hold_s: time
+    at the start in which the law `nominal` flies level, s. ground_m: height of the ground for the autopilot
+    above sea level; None: 0, or the altitude of a flight from the ground. log: whether a log is kept.
     """
 
     def __init__(
@@ -268,8 +275,12 @@ class Vehicle:
         ground_m: float | None = None,
         log: bool = True,
     ) -> None:
-        self.given, self.hold_s, self._fixed_hz = scenario, hold_s, rate_hz
-        self._pulses, self._log, self._on_ground = pulses, log, bool(scenario.initial.on_ground)
+        self.given = scenario
+        self.hold_s = hold_s
+        self._fixed_hz = rate_hz
+        self._pulses = pulses
+        self._log = log
+        self._on_ground = bool(scenario.initial.on_ground)
         if self._on_ground and (hold_s or ground_m is not None):
             what = "--hold" if hold_s else "--ground"
             says = "has no meaning on the ground, which is at initial.altitude_m, allowed: to leave it out"
@@ -284,16 +295,17 @@ class Vehicle:
         self._warm_up()
 
     def _warm_up(self) -> None:
-        """Have what such a flight uses compiled, before anybody waits for an answer."""
-        flight, substeps = self.flight, self.scenario.substeps
+        """Compile the kernels of such a flight before an autopilot waits for an answer."""
+        flight = self.flight
+        substeps = self.scenario.substeps
         if not self._on_ground:
             flight.pilot(2 * substeps, None, None)
         flight.pilot(2 * substeps, flight.trim_rad, None)
         flight.reset()
 
     def begin(self, packets_hz: float, channels: int = MOST_CHANNELS) -> None:
-        """A flight from trim, at this rate of packets of so many outputs. Raises BadInput for one that cannot
-        be flown."""
+        """Begin a flight from trim. packets_hz: rate of the packets; channels: number of their outputs.
+        Raises BadInput for a flight that is not possible."""
         if self.sim is not None:
             self.outputs.check(channels)
         packets_hz = self._fixed_hz or packets_hz
@@ -301,7 +313,8 @@ class Vehicle:
             if self.sim.frames > 1 or self._inside:
                 self.sim.reset()
         else:
-            before, self.scenario = self.sim, at_rate(self.given, packets_hz)
+            before = self.sim
+            self.scenario = at_rate(self.given, packets_hz)
             log = SpooledLog() if self._log else False
             self.sim = Flown(self.scenario, log=log, ground_m=self._ground_m)
             if before is not None:
@@ -324,12 +337,12 @@ class Vehicle:
 
     @property
     def over(self) -> bool:
-        """Whether the flight has ended: its duration flown, or the aircraft lost."""
+        """Whether the flight has ended: after its duration, or because the aircraft is lost."""
         return self.flight.done
 
     def runs_of(self, frame_hz: float) -> int:
-        """JSBSim frames in a frame of this rate; where they are no whole number, those of the rate at which
-        the flight was begun."""
+        """Number of JSBSim frames in a frame of this rate. If it is no whole number, or the rate is fixed,
+        that of the rate at which the flight began."""
         wanted = self._jsbsim_hz / frame_hz if frame_hz >= SLOWEST_HZ else 0.0
         runs = round(wanted)
         if self._fixed_hz is None and runs >= 1 and abs(wanted - runs) <= WHOLE * runs:
@@ -339,8 +352,10 @@ class Vehicle:
         return round(self._jsbsim_hz / self.packets_hz)
 
     def fly(self, outputs: Sequence[float], frame_hz: float, in_charge: bool = True) -> None:
-        """A frame of the autopilot, with these outputs. in_charge: it flies, once `hold_s` are over."""
-        sim, runs = self.flight, self.runs_of(frame_hz)
+        """Fly a frame of the autopilot. in_charge: whether its outputs command the surfaces once `hold_s` is
+        over."""
+        sim = self.flight
+        runs = self.runs_of(frame_hz)
         if in_charge and sim.frames / sim.rate_hz > self.hold_s:
             sim.pilot(runs, self.outputs.deflections(outputs), self.outputs.power(outputs))
         elif self._on_ground:
@@ -349,26 +364,26 @@ class Vehicle:
             sim.pilot(runs, None, None)
 
     def instant(self) -> Instant:
-        """What is known of the frame just flown."""
+        """The instant after the last frame."""
         return self.flight.instant()
 
 
 def at_rate(scenario: Scenario, packets_hz: float) -> Scenario:
-    """The scenario at the rate of the packets, or at a part of it that the diagnosis keeps up with: then
-    every packet is some of JSBSim's frames, and the outputs of each first of them count. Raises BadInput."""
+    """The scenario at the rate of the packets. Above FASTEST_HZ, at a whole fraction of it: several packets
+    are then a frame of the loop, and the outputs of the first of them count. Raises BadInput for a rate that
+    is out of range."""
     if not SLOWEST_HZ <= packets_hz <= FASTEST_PACKETS_HZ:
         allowed = f"{SLOWEST_HZ:g} to {FASTEST_PACKETS_HZ:g} Hz, or --rate"
         raise BadInput(f"{scenario.name}: frames of an autopilot at {packets_hz:g} Hz, allowed: {allowed}")
-    packets = ceil(packets_hz / FASTEST_HZ - 1e-9)  # to a frame of the loop
+    packets = ceil(packets_hz / FASTEST_HZ - 1e-9)  # packets in a frame of the loop
     substeps = packets * ceil(scenario.substeps / packets)
     changes = {**THEIRS, "rate_hz": packets_hz / packets, "substeps": substeps}
     return scenario.with_(changes)
 
 
 def without_reference(scenario: Scenario) -> tuple[Scenario, list[str]]:
-    """The scenario without what only a law of ours can be expected to do, and a line for each such key.
-
-    Raises BadInput for `changes`, which are of our law and our diagnosis' sensors.
+    """The scenario without the keys of `expect` that hold for a law of this package only, and a line for each
+    of them. Raises BadInput for `changes`, since these change such a law or sensors of the diagnosis.
     """
     if scenario.changes:
         raise BadInput(f"{scenario.name}: changes: there are none under an autopilot, allowed: faults")

@@ -66,7 +66,7 @@ class RecordedFlight:
     name: str
     columns: Columns
     logged_failures: tuple[LoggedFailure, ...] = ()
-    notes: tuple[str, ...] = field(default=())
+    notes: tuple[str, ...] = ()
     parameters: Parameters = field(default_factory=dict)
     unread_column_names: tuple[str, ...] = ()
 

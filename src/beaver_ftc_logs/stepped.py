@@ -180,18 +180,17 @@ def rows_of_replay(t_s: Floats, replay: Replayed, surfaces: Sequence[str], fdi: 
 
     The estimate of a fault without a type is taken as theta of a loss, within its bounds, which stay 0 and 1.
     """
-    faulty = np.array([verdict.detected for verdict in replay.verdicts])
     low = np.zeros_like(replay.alone_low)
     high = np.ones_like(low)
     e = np.ones_like(low)
+    names = np.full(len(low), "", dtype=object)
     for k, verdict in enumerate(replay.verdicts):
+        if verdict.detected:
+            names[k] = verdict.isolated if verdict.isolated in surfaces else UNKNOWN_SURFACE
         if fdi.is_ours and not fdi.pairs:
             low[k], high[k] = _bounds(verdict, replay.alone_low[k], replay.alone_high[k], surfaces)
         is_loss = verdict.type in (None, LOSS_FAULT_TYPE)
         if is_loss and verdict.estimate is not None and verdict.isolated in surfaces:
             s = surfaces.index(verdict.isolated)
             e[k, s] = min(max(1.0 + float(verdict.estimate), low[k, s]), high[k, s])
-    isolated = [
-        verdict.isolated if verdict.isolated in surfaces else UNKNOWN_SURFACE for verdict in replay.verdicts
-    ]
-    return LogRows.of_names(t_s, np.where(faulty, np.array(isolated, dtype=object), ""), e, low, high)
+    return LogRows.of_names(t_s, names, e, low, high)

@@ -62,18 +62,9 @@ _LARGE_FILE_STORES = {
 }
 
 
-def read_flight(
-    path: Path,
-    reader: str | None = None,
-    time: TimeSource | None = None,
-    columns: Wanted = None,
-) -> RecordedFlight:
-    """The recorded flight in a file or folder. Raises BadInput with one line: why the log cannot be used.
-
-    reader: one of READERS; if None, by the form of the path. time: column of the time of a table and its
-    unit. columns: the columns that are read and held in memory; all if None.
-    """
-    return next(read_parts(path, reader, time, columns, in_parts=False))
+def read_flight(path: Path, reader: str | None = None, columns: Wanted = None) -> RecordedFlight:
+    """The recorded flight in a file or folder, as `read_parts`, in one part."""
+    return next(read_parts(path, reader, None, columns, in_parts=False))
 
 
 def read_parts(
@@ -83,7 +74,12 @@ def read_parts(
     columns: Wanted = None,
     in_parts: bool = True,
 ) -> Iterator[RecordedFlight]:
-    """As `read_flight`, but a long table in several parts, unless in_parts is false."""
+    """The recorded flight in a file or folder; a long table in several parts, unless in_parts is false.
+    Raises BadInput with one line: why the log cannot be used.
+
+    reader: one of READERS; if None, by the form of the path. time: column of the time of a table, and its
+    unit; if None, `t_s` in s. columns: the columns that are read and held in memory; all if None.
+    """
     check_exists(path)
     reader = reader or reader_name_for_path(path)
     if reader not in READERS:

@@ -6,7 +6,7 @@ import pytest
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs.check import check_log
 from beaver_ftc_logs.known_commands import is_command_name, multicopter_reason
-from beaver_ftc_logs.readers import check_exists, read_flight, reader_name_for_path
+from beaver_ftc_logs.readers import check_exists, read_parts, reader_name_for_path
 from beaver_ftc_logs.readers.time_text import seconds_of_text
 from products.logs import synthetic
 from products.logs.small import run
@@ -105,14 +105,14 @@ def test_other_words_are_no_time(text):
 def test_a_clock_that_passes_midnight_goes_on(tmp_path):
     path = tmp_path / "a.csv"
     path.write_text("UTC,p\n23:59:59.5,1\n23:59:59.9,2\n00:00:00.3,3\n00:00:00.7,4\n")
-    stamps = read_flight(path, None, ("UTC", "s")).columns["p"].t_s
+    stamps = next(read_parts(path, None, ("UTC", "s"))).columns["p"].t_s
     np.testing.assert_allclose(np.diff(stamps), 0.4, atol=1e-9)
 
 
 def test_a_cell_that_is_no_clock_does_not_hide_midnight(tmp_path):
     path = tmp_path / "a.csv"
     path.write_text("UTC,p,clock\n0,1,23:59:59\n1,2,23:59:75\n2,3,00:00:01\n")
-    clock = read_flight(path, None, ("UTC", "s")).columns["clock"].values
+    clock = next(read_parts(path, None, ("UTC", "s"))).columns["clock"].values
     np.testing.assert_array_equal(clock, [86399.0, np.nan, 86401.0])
 
 

@@ -14,7 +14,7 @@ from beaver_ftc_logs.mixing_parts import (
     Axes,
     BadParameterError,
     CheckedParameters,
-    Found,
+    MixingParts,
     Surface,
     full_name,
     pulse_reading,
@@ -49,7 +49,7 @@ _MAX_MIXING_GAIN = 5.0
 _MAX_MIXING_OFFSET = 1000.0
 
 
-def ardupilot_mixing(params: CheckedParameters) -> Found:
+def ardupilot_mixing(params: CheckedParameters) -> MixingParts:
     """The surfaces by SERVOn_FUNCTION, the pulse of the output of each, and the commands of the axes. The
     lines of params receive a remark on each part that is left out.
     """
@@ -57,9 +57,12 @@ def ardupilot_mixing(params: CheckedParameters) -> Found:
     names = {int(match[1]): match[0] for match in matches if match}
     if not names:
         params.lines.append("SERVOn_FUNCTION is not in the log")
-    kinds = params.kinds("channel", dict(sorted(names.items())), _SURFACES, "is no surface", (-1, 0))
+    kinds = params.kinds(
+        "channel", dict(sorted(names.items())), _SURFACES, unknown_text="is no surface", unused=(-1, 0)
+    )
     factors, mixer_reason = _ardupilot_mixers(params, kinds.values())
     surfaces = []
+    outputs = []
     for channel, kind in kinds.items():
         name, shares, is_mixed = _SURFACES[kind]
         mixer_factors = factors if is_mixed else 1.0
@@ -68,17 +71,12 @@ def ardupilot_mixing(params: CheckedParameters) -> Found:
         reason = f"SERVO{channel}_FUNCTION {kind}"
         mixer = mixer_reason if is_mixed else ""
         surfaces.append(Surface(full, f"channel {channel}", kind, axis_shares, reason, mixer))
-    outputs = []
-    for channel_number in kinds:
-        message = next((text for last, text in _MESSAGES.items() if channel_number <= last), "RCO?")
-        pulses = {part: f"SERVO{channel_number}_{part}" for part in PULSE_RANGE_US}
-        place = f"SERVO{channel_number}_MIN, _TRIM, _MAX"
-        outputs.append(
-            (
-                f"{message}.C{channel_number}",
-                pulse_reading(params, place, pulses, f"SERVO{channel_number}_REVERSED"),
-            )
+        message = next((text for last, text in _MESSAGES.items() if channel <= last), "RCO?")
+        pulses = {part: f"SERVO{channel}_{part}" for part in PULSE_RANGE_US}
+        reading = pulse_reading(
+            params, f"SERVO{channel}_MIN, _TRIM, _MAX", pulses, reverse=f"SERVO{channel}_REVERSED"
         )
+        outputs.append((f"{message}.C{channel}", reading))
     return surfaces, [outputs], Axes(_AXIS_COLUMNS, 1.0 / _FULL_COMMAND)
 
 

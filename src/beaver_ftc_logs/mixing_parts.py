@@ -79,7 +79,7 @@ class Axes:
 
 # The surfaces; the ways in which their outputs can be logged, each with an entry a surface; and the commands
 # of the axes, before the mixer.
-Found = tuple[list[Surface], list[Outputs], Axes]
+MixingParts = tuple[list[Surface], list[Outputs], Axes]
 
 
 @dataclass

@@ -15,7 +15,7 @@ from beaver_ftc_logs.mixing_parts import (
     Axes,
     BadParameterError,
     CheckedParameters,
-    Found,
+    MixingParts,
     Outputs,
     Surface,
     full_name,
@@ -37,7 +37,7 @@ _FIXED_WING = 1  # CA_AIRFRAME of a fixed wing
 _AXIS_COLUMNS = tuple(f"vehicle_torque_setpoint.xyz[{i}]" for i in range(3))
 
 
-def px4_mixing(params: CheckedParameters, column_names: set[str]) -> Found:
+def px4_mixing(params: CheckedParameters, column_names: set[str]) -> MixingParts:
     """The surfaces by CA_SV_CSn_TYPE, with shares by their torques; the ways in which their outputs may be
     logged; the commands of the axes. The lines of params receive a remark on each part that is left out.
 
@@ -49,7 +49,9 @@ def px4_mixing(params: CheckedParameters, column_names: set[str]) -> Found:
         params.lines.append(str(problem))
         n = 0
     names = {i: f"CA_SV_CS{i}_TYPE" for i in range(n)}
-    kinds = params.kinds("surface", names, _SURFACES, "moves the aircraft about no axis", ())
+    kinds = params.kinds(
+        "surface", names, _SURFACES, unknown_text="moves the aircraft about no axis", unused=()
+    )
     shares = _px4_axis_shares(params, kinds)
     drivers: dict[int, list[str]] = {}
     surfaces = []
@@ -58,8 +60,11 @@ def px4_mixing(params: CheckedParameters, column_names: set[str]) -> Found:
             params.lines.append(f"surface {i} stays out: CA_SV_CS{i}_TRQ_R, _P and _Y are 0")
             continue
         servo = _FIRST_SERVO + i
-        with_this_servo = [name for name, values in params.values_by_name.items() if values[-1] == servo]
-        drivers[i] = [name for name in with_this_servo if re.fullmatch(_OUTPUT_PATTERN, name)]
+        drivers[i] = [
+            name
+            for name, values in params.values_by_name.items()
+            if values[-1] == servo and re.fullmatch(_OUTPUT_PATTERN, name)
+        ]
         reason = f"CA_SV_CS{i}_TYPE {kind}{''.join(f', {name} {servo}' for name in drivers[i])}"
         full = full_name(_SURFACES[kind], i, kinds)
         surfaces.append(Surface(full, f"surface {i}", i, shares[i], reason))
@@ -101,6 +106,8 @@ def _px4_pulses(params: CheckedParameters, drivers: Sequence[list[str]]) -> list
     readings = []
     for driver, n in outputs:
         names = {part: f"{driver}_{part}{n}" for part in ("MIN", "MAX")}
-        reading = pulse_reading(params, f"{driver}_MIN{n}, middle, _MAX", names, f"{driver}_REV", n - 1)
+        reading = pulse_reading(
+            params, f"{driver}_MIN{n}, middle, _MAX", names, reverse=f"{driver}_REV", bit=n - 1
+        )
         readings.append((f"actuator_outputs.output[{n - 1}]", reading))
     return [readings]

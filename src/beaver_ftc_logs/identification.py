@@ -141,13 +141,14 @@ def whiten_flights(flights: Sequence[Samples], vehicle: Vehicle) -> list[Samples
         1. the first averages: for each flight the likeliest by fits to this flight alone, one an average
         2. a common fit to all flights, whitened by their averages
         3. for each flight the likeliest average by the residual of the common fit; stop if none has changed
+           since step 4
         4. whiten again, with weights that give all flights the same noise (they are 1 before); continue with
            step 2, for at most _MAX_ROUNDS rounds
 
     Likelihoods are those of `_likeliest_ma`. Raises BadInput if a flight has fewer than 2 samples for a fit.
 
     own_residuals, common_residuals: for each flight, moving average -> residual, by step 1 and 3. averages:
-    the moving average of each flight.
+    the moving average of each flight by step 3, empty before the first round.
     """
     if not vehicle.moving_air:
         return list(flights)
@@ -169,8 +170,9 @@ def whiten_flights(flights: Sequence[Samples], vehicle: Vehicle) -> list[Samples
         return left_by(Z, y)
 
     own_residuals = [{ma: own_residual(flight, ma) for ma in NOISE_MA_CANDIDATES} for flight in flights]
-    averages = [_likeliest_ma(residuals)[1] for residuals in own_residuals]
-    whitened = [whiten_samples(flight, ma) for flight, ma in zip(flights, averages, strict=True)]
+    first = [_likeliest_ma(residuals)[1] for residuals in own_residuals]
+    whitened = [whiten_samples(flight, ma) for flight, ma in zip(flights, first, strict=True)]
+    averages: list[tuple[float, ...]] = []
     for _ in range(_MAX_ROUNDS):
         Z, y = stacked(whitened)
         C = np.linalg.lstsq(Z, y, rcond=None)[0]

@@ -63,6 +63,15 @@ def test_a_fit_finds_the_colours_that_a_law_answers(flights, moving):
     assert off < 0.5 * off_without
 
 
+def test_a_louder_flight_counts_less_even_if_no_colour_changes():
+    """Everything three times as large: the same colour, found at once, and a third of the weight."""
+    flight = flown((1.0,), 0.5, 4000, 2)
+    louder = replace(flight, rates=3.0 * flight.rates, commands=3.0 * flight.commands)
+    white = identification.whiten_flights([flight, louder], VEHICLE)
+    assert white[0].noise_ma_coefficients == white[1].noise_ma_coefficients
+    assert white[0].fit_weight == pytest.approx(3.0 * white[1].fit_weight)
+
+
 @pytest.mark.parametrize("colour", [0, 1])
 def test_a_model_of_two_colours_takes_the_likelier(flights, moving, colour):
     """A flight through the noise it has, picked at once, is as if the other had never been seen; and no row

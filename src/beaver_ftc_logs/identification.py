@@ -8,7 +8,6 @@ V, V0       airspeed, m/s, and the airspeed at which a command has the effect of
 """
 
 from collections.abc import Sequence
-from itertools import product
 
 import numpy as np
 
@@ -234,9 +233,9 @@ def scale_if_better(flights: Sequence[Samples], vehicle: Vehicle) -> tuple[Seque
     this explains decisively more; otherwise both as they are, as if the file states V0 or no airspeed is
     known.
 
-    Where other laws may fly, each group of surfaces in turn takes another power if the criterion is then less
-    than `lowest`: at first that of the power 2 less _DECISIVE_BIC, later that of the powers taken so far. V0:
-    median of the known airspeeds.
+    Where other laws may fly, each group of surfaces in turn takes the best of the other powers if it explains
+    decisively more than the power so far, with the powers that the groups before it have taken. V0: median of
+    the known airspeeds.
     """
     V = np.concatenate([flight.airspeed for flight in flights])
     V = V[np.isfinite(V)]
@@ -250,14 +249,17 @@ def scale_if_better(flights: Sequence[Samples], vehicle: Vehicle) -> tuple[Seque
     if best.other_laws:
         # The criterion counts every sample as independent, which holds for white noise only.
         white = whiten_flights(_scaled(flights, best), best) if best.moving_air else None
-        lowest = _min_bic(_scaled(flights, best, white), best) - _DECISIVE_BIC
+        lowest = _min_bic(_scaled(flights, best, white), best)
         names = list(best.surfaces)
-        for group, power in product(group_surfaces(best), _AIRSPEED_POWERS):
-            powers = best.airspeed_powers | {names[i]: power for i in group}
-            candidate = best.model_copy(update={"airspeed_powers": powers})
-            if (bic := _min_bic(_scaled(flights, candidate, white), candidate)) < lowest:
-                lowest = bic
-                best = candidate
+        for group in group_surfaces(best):
+            by_bic = {}
+            for power in _AIRSPEED_POWERS:
+                powers = best.airspeed_powers | {names[i]: power for i in group}
+                candidate = best.model_copy(update={"airspeed_powers": powers})
+                by_bic[_min_bic(_scaled(flights, candidate, white), candidate)] = candidate
+            if lowest - min(by_bic) >= _DECISIVE_BIC:
+                lowest = min(by_bic)
+                best = by_bic[lowest]
     scaling = {key: getattr(best, key) for key in ("reference_airspeed_mps", "airspeed_powers")}
     return _scaled(flights, best), vehicle.model_copy(update=scaling)
 

@@ -13,10 +13,10 @@ from products.logs import small
 MODEL = small.model()
 
 
-def pressed(flight, seed=3):
+def pressed(flight, powers=(2, 2)):
     """The flight as it would be at airspeeds of 15 to 25 m/s, if its commands stood at what they do."""
-    speeds = 20.0 + 5.0 * np.sin(0.05 * np.arange(len(flight.t_s)) + seed)
-    return replace(flight, airspeed=speeds, commands=flight.commands / ((speeds / 20.0) ** 2)[:, None])
+    speeds = 20.0 + 5.0 * np.sin(0.05 * np.arange(len(flight.t_s)) + 3)
+    return replace(flight, airspeed=speeds, commands=flight.commands / (speeds[:, None] / 20.0) ** powers)
 
 
 def test_commands_count_with_the_dynamic_pressure_where_that_explains_more():
@@ -30,6 +30,15 @@ def test_commands_count_with_the_dynamic_pressure_where_that_explains_more():
         assert scale_if_better(plain, its) == (plain, its)
     told = its.model_copy(update={"reference_airspeed_mps": 20.0})
     assert scale_if_better([pressed(flight)], told)[1] == told
+
+
+def test_each_group_takes_another_power_only_if_that_explains_decisively_more():
+    """The criterion of the power 3 is less by 15 if the true power is 2.6, and by 2 if it is 2.55."""
+    vehicle = MODEL.vehicle.model_copy(update={"other_laws": True, "moving_air": False})
+    flight = small.flight(MODEL, 1100)
+    for left, taken in ((2.6, {"right": 1.0, "left": 3.0}), (2.55, {"right": 1.0})):
+        _, described = scale_if_better([pressed(flight, (1.0, left))], vehicle)
+        assert described.airspeed_powers == taken
 
 
 def lagged(n=1200, lag_s=0.1, delay_s=0.13, seed=4, noise=0.002):

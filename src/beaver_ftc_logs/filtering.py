@@ -184,7 +184,7 @@ def recent_scale(g: Floats, ok: np.ndarray, rate_hz: float) -> Floats:
         max over the spans of the mean of |sum of g over the span|^2 / (3 number of ok samples in the span)
 
     g (n, 3): residual in standard deviations of the noise, 0 where a sample is not ok (n,). The mean is over
-    all rows of the window, so unknown rows lower it.
+    the rows of the window whose span has an ok sample; 0 without such a row.
 
     Air, gyros or a law that no fitted flight had leave a larger residual, and evidence must then count less
     at once. A fault leaves a larger residual, too; the right hypothesis explains it.
@@ -192,9 +192,10 @@ def recent_scale(g: Floats, ok: np.ndarray, rate_hz: float) -> Floats:
     ratio = np.zeros(len(g))
     for span_s in _SUM_SPANS_S:
         sums, _ = trailing_sums(np.column_stack([g, ok]), span_s * rate_hz)
-        squares = (sums[:, :3] ** 2).sum(axis=1) / (3.0 * np.maximum(sums[:, 3], 1.0))
-        total, n_sums = trailing_sums(squares, _VARIANCE_WINDOW_S * rate_hz)
-        ratio = np.maximum(ratio, total / n_sums)
+        n_ok = sums[:, 3]
+        squares = (sums[:, :3] ** 2).sum(axis=1) / (3.0 * np.maximum(n_ok, 1.0))
+        totals, _ = trailing_sums(np.column_stack([squares, n_ok > 0.0]), _VARIANCE_WINDOW_S * rate_hz)
+        ratio = np.maximum(ratio, totals[:, 0] / np.maximum(totals[:, 1], 1.0))
     return ratio
 
 

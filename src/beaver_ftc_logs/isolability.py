@@ -79,18 +79,26 @@ def _own_information(F: Floats, g: int) -> float:
 
 
 def _alarm_odds(model: Model, bank: HypothesisBank, g: int, dt_s: float) -> float:
-    """Log odds that the evidence for a loss of this group must exceed to reach the probability `alarm` of the
-    settings, also if these have a threshold of the evidence; inf if the bank has no such loss.
+    """Log odds that the evidence for a loss of this group must exceed to raise the alarm; inf if the bank has
+    no such loss:
 
-    log(alarm / (1 - alarm)) - log(p),    p: probability that a sample begins a loss with the median share of
-                                          all hypotheses in which this group loses effectiveness
+        without a threshold     log(alarm / (1 - alarm)) - log(p)
+        with the threshold mu   max(mu - log(share / sum of the shares of all faults), -log(p))
+
+    share: median transition share of the hypotheses in which this group loses effectiveness; p: probability
+    that a sample begins a loss of this share. Page's sum counts the evidence for any fault; besides, an alarm
+    needs a fault that is likelier than health (`posterior_rows.rows_of_posterior`).
     """
     settings = model.settings
     shares = bank.transition_share[bank.is_fault_of_group(g)]
     if not len(shares):
         return float("inf")
-    p = settings.changes_per_hour * dt_s / 3600.0 * float(np.median(shares))
-    return float(np.log(settings.alarm / (1.0 - settings.alarm)) - np.log(p))
+    share = float(np.median(shares))
+    p = settings.changes_per_hour * dt_s / 3600.0 * share
+    if settings.threshold is None:
+        return float(np.log(settings.alarm / (1.0 - settings.alarm)) - np.log(p))
+    all_shares = bank.transition_share[bank.is_fault_hypothesis].sum()
+    return float(max(settings.threshold - np.log(share / all_shares), -np.log(p)))
 
 
 def _smallest_losses(J: float, odds: float) -> dict[str, float | None]:

@@ -56,7 +56,8 @@ def test_groups_that_act_alike_or_opposed_are_not_separable(sampled, wing_model,
 
 def test_the_smallest_loss_by_its_closed_form(sampled, wing_model):
     """d^2 / 2 times the information gathered equals the odds, sample by sample from the model file; the same
-    samples taken for half as long each carry twice as much a second."""
+    samples taken for half as long each carry twice as much a second. An alarm by a threshold also needs a
+    fault that is likelier than health."""
     samples = sampled(40.0, seed=46)
     inverse = np.linalg.inv(np.array(wing_model.noise))
     response, lags = np.array(wing_model.response), wing_model.lags
@@ -65,17 +66,15 @@ def test_the_smallest_loss_by_its_closed_form(sampled, wing_model):
     for k in range(first, len(samples.t_s)):
         moved = sum(samples.commands[k - j, 0] * response[0][j - 1] for j in range(1, lags + 1))
         information.append(moved @ inverse @ moved)
-    settings = wing_model.settings
-    for rate_hz in (10.0, 20.0):
-        found = isolability_document(replace(samples, dt_s=1.0 / rate_hz), wing_model)["groups"][0]
+    shares = build_bank(wing_model).transition_share
+    faults = shares[build_bank(wing_model).is_fault_hypothesis].sum()
+    share = np.median(shares[build_bank(wing_model).is_fault_of_group(0)])
+    for rate_hz, threshold in ((10.0, None), (20.0, None), (10.0, 30.0), (10.0, 1.0)):
+        settings = wing_model.settings.model_copy(update={"threshold": threshold})
+        model = wing_model.model_copy(update={"settings": settings})
+        found = isolability_document(replace(samples, dt_s=1.0 / rate_hz), model)["groups"][0]
         per_s = settings.power * np.mean(information) * rate_hz
         assert found["information_per_s"] == pytest.approx(per_s, rel=1e-9)
-        odds = 0.5 * found["smallest_loss"]["60"] ** 2 * per_s * 60.0
-        share = np.median(
-            build_bank(wing_model).transition_share[build_bank(wing_model).is_fault_of_group(0)]
-        )
-        change = settings.changes_per_hour / 3600.0 / rate_hz * share
-        assert odds == pytest.approx(
-            np.log(settings.alarm / (1.0 - settings.alarm) / change),
-            rel=1e-9,
-        )
+        likelier = -np.log(settings.changes_per_hour / 3600.0 / rate_hz * share)
+        odds = likelier if threshold != 30.0 else 30.0 - np.log(share / faults)
+        assert 0.5 * found["smallest_loss"]["60"] ** 2 * per_s * 60.0 == pytest.approx(odds, rel=1e-9)

@@ -20,6 +20,7 @@ from beaver_ftc_logs.folds import fold_qualities
 from beaver_ftc_logs.free_runs import fit_output_error
 from beaver_ftc_logs.groups import group_indices, group_surfaces
 from beaver_ftc_logs.least_squares import left_by
+from beaver_ftc_logs.loading import have_labels
 from beaver_ftc_logs.model import FittedRanges, Model, NoiseModel
 from beaver_ftc_logs.recording import Floats
 from beaver_ftc_logs.regression import Parts
@@ -112,7 +113,7 @@ def assume_law_and_air(flights: Sequence[Samples], vehicle: Vehicle) -> tuple[Ve
     An alarm then needs more evidence. If a flight has labels, later flights are assumed to be as these: both
     become false.
     """
-    labelled = any(np.isfinite(flight.labels).any() for flight in flights)
+    labelled = have_labels(flights)
     reason = "labels show faults under it" if labelled else "logs of healthy flight do not tell"
     texts = {"other_laws": "other laws may fly", "moving_air": "the air may move"}
     lines = []

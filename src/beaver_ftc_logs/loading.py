@@ -118,8 +118,9 @@ def _concatenate_samples(name: str, stretches: list[Samples], n_parts: int) -> S
 
 
 def load_flights_for_fit(paths: Sequence[Path], vehicle: Vehicle, reader: str | None = None) -> list[Samples]:
-    """The flights, each on one time base; of a long one the stretches for a fit. Raises BadInput with a line
-    for each log that cannot be used.
+    """The flights, each on one time base; of a long one the stretches for a fit. If no log has a label, they
+    are averaged as in moving air, which `identify` then assumes, although the vehicle file may name labels.
+    Raises BadInput with a line for each log that cannot be used.
     """
     flights: list[Samples] = []
     mistakes: list[str] = []
@@ -131,7 +132,14 @@ def load_flights_for_fit(paths: Sequence[Path], vehicle: Vehicle, reader: str | 
     if mistakes:
         raise BadInput("\n".join(mistakes))
     refuse_equal_names(samples.name for samples in flights)
+    if vehicle.labels and vehicle.moving_air is None and not have_labels(flights):
+        return load_flights_for_fit(paths, vehicle.model_copy(update={"moving_air": True}), reader)
     return flights
+
+
+def have_labels(flights: Iterable[Samples]) -> bool:
+    """Whether any of the flights has a known label."""
+    return any(np.isfinite(flight.labels).any() for flight in flights)
 
 
 def refuse_equal_names(names: Iterable[str]) -> None:

@@ -240,16 +240,16 @@ def _fit_noise_model(alike: Parts, model: Model) -> NoiseModel:
 def _with_errors(alike: Parts, model: Model, noise: NoiseModel) -> NoiseModel:
     """The noise model of some flights with two more fields:
 
-        misreads (G,)   share by which a fit may misread the effect of each group: largest / sqrt(3), the
-                        standard deviation of an error that is uniform between plus and minus the largest,
-                        which is at most GAIN_SD_CAP
+        misreads (G,)   share by which a fit may misread the effect of each group: m / sqrt(3), the standard
+                        deviation of an error that is uniform between -m and m, where m is at most GAIN_SD_CAP
         quick           power of the quick part of the responses that the flights exceed in a tenth of their
                         samples, in variances of the noise
 
     The part of a residual that the past predicts is no noise: the model lacks it. A law that feeds it back to
     the surfaces makes it look like their effect. Let q be the power of this part on an axis and p that of the
-    effect, both in variances of the noise. The effect is then misread by at most the share sqrt(q / p). Least
-    squares weighs the axes by p: with independent errors of the axes, the share is sqrt(sum q p) / sum p.
+    effect, both in variances of the noise. The effect on this axis is then misread by at most the share
+    sqrt(q / p). Least squares weighs the axes by p. m adds their errors as if these were independent,
+    m = sqrt(sum q p) / sum p, so it is no bound: if all axes err alike, the share is sum sqrt(q p) / sum p.
     """
     flights = [part.innovations(model.model_copy(update={"colours": [noise]})) for part in alike]
     r = np.diag(np.array(noise.noise))

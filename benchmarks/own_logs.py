@@ -42,10 +42,11 @@ from beaver_ftc.results.writer import run
 from beaver_ftc.studies.present.tables import grouped, markdown_table
 from beaver_ftc_logs.by_aircraft import diagnose_aircraft, load_diagnosed
 from beaver_ftc_logs.diagnose import diagnose
-from beaver_ftc_logs.identification import identify, scale_if_better
+from beaver_ftc_logs.identification import identify
 from beaver_ftc_logs.loading import load_flights_for_fit, read_vehicle_columns
 from beaver_ftc_logs.log_rows import LogRows
 from beaver_ftc_logs.model import Model, model_file_text
+from beaver_ftc_logs.preparation import scale_if_better
 from beaver_ftc_logs.samples import resample
 from beaver_ftc_logs.vehicle import Vehicle, load_vehicle
 

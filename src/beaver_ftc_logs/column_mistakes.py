@@ -39,14 +39,15 @@ _UNIT_FACTOR_ROOT = 1.6
 _MAX_ALIKE_FACTOR = 3.0
 # Another unit changes a motion by this factor at least.
 _MIN_UNIT_FACTOR = 12.0
-_COMMAND_UNIT_HINT = ": one unit (57.3 is deg for rad, 100 percent: `unit`, `scale`)"
-_CHANGED_EFFECT = "the command of {} moves {:.3g} times as much as in the flights of the model, and does "
-# The text of each kind of mistake. Its fields: name of the group, motion over that in the flights of the
-# model, gain.
+# The text of each kind of mistake. group: its name; motion: over that in the flights of the model.
 _COMMAND_MISTAKES = {
-    "sign": "the rates answer the command of {} the other way round in all of it (does `scale: -1` fit?)",
-    "weak": f"{_CHANGED_EFFECT}at most {{:.2g}} of what it did{_COMMAND_UNIT_HINT}",
-    "strong": f"{_CHANGED_EFFECT}at least {{:.3g}} times what it did{_COMMAND_UNIT_HINT}",
+    "sign": "the rates answer the command of {group} the other way round in all of it "
+    "(does `scale: -1` fit?)",
+    "weak": "the command of {group} moves {motion:.3g} times as much as in the flights of the model, and "
+    "does at most {gain:.2g} of what it did: one unit (57.3 is deg for rad, 100 percent: `unit`, `scale`)",
+    "strong": "the command of {group} moves {motion:.3g} times as much as in the flights of the model, and "
+    "does at least {gain:.3g} times what it did: one unit (57.3 is deg for rad, 100 percent: `unit`, "
+    "`scale`)",
 }
 # Below this gain a command has the opposite effect. Of 576 correct logs with faults of any kind, the least
 # gain was 0.98, in light turbulence 0.93 (`own_logs.py`, seeds 31 to 42; 71 to 201).
@@ -83,28 +84,25 @@ def refuse_rate_unit(samples: Samples, ranges: FittedRanges) -> None:
             raise BadInput(f"{samples.name}: {motion}, allowed: rates in rad/s; {text}")
 
 
-def refuse_command_unit(
-    name: str, commands: Floats, rates: Floats, ranges: FittedRanges, surfaces: Sequence[str]
-) -> None:
-    """Raise BadInput where the motion of a command, over that in the flights of the model, shows another
-    unit.
+def refuse_command_unit(flight: Samples, first: Samples, surfaces: Sequence[str]) -> None:
+    """Raise BadInput where the motion of a command, over that in another flight, `first`, shows another unit.
 
     rates                               motion of the command that is refused
     each between 1 / 3 and 3 times      below 1 / 12, or above 12 times
     otherwise                           above 12 times the largest motion of a rate, or 12 if that is larger
 
     The factors are _MAX_ALIKE_FACTOR and _MIN_UNIT_FACTOR. A motion beyond 1e-4 to 1e4 is not judged here.
-    commands (n, S), rates (n, 3).
     """
-    rate_ratios = _relative_motion(rates, ranges.rates)
+    rate_ratios = _relative_motion(flight.rates, central_ranges(first.rates))
     alike = rate_ratios.min() > 1.0 / _MAX_ALIKE_FACTOR and rate_ratios.max() < _MAX_ALIKE_FACTOR
     allowed = _MIN_UNIT_FACTOR * (1.0 if alike else max(rate_ratios.max(), 1.0))
-    ratios = _relative_motion(commands, ranges.commands)
+    ratios = _relative_motion(flight.commands, central_ranges(first.commands))
     for surface, ratio in zip(surfaces, ratios.tolist(), strict=True):
         if allowed < ratio < 1e4 or (alike and 1e-4 < ratio < 1.0 / _MIN_UNIT_FACTOR):
             raise BadInput(
-                f"{name}: the command of {surface} moves {ratio:.3g} times as much as in the other flights, "
-                f"the rates {rate_ratios.max():.2g} times at most, allowed{_COMMAND_UNIT_HINT}"
+                f"{flight.name}: the command of {surface} moves {ratio:.3g} times as much as in the other "
+                f"flights, the rates {rate_ratios.max():.2g} times at most, allowed: one unit (57.3 is deg "
+                "for rad, 100 percent: `unit`, `scale`)"
             )
 
 
@@ -163,8 +161,11 @@ def refuse_columns(samples: Samples, model: Model) -> None:
     if measured is None:
         return
     mistakes = _lasting_mistakes(samples, model, measured)
-    texts = (_COMMAND_MISTAKES[kind].format(group, *sizes) for (kind, group), sizes in mistakes.items())
-    text = next(texts, None) or _likelier_mistake(flight, likeliest)
+    texts = [
+        _COMMAND_MISTAKES[kind].format(group=group, motion=motion, gain=gain)
+        for (kind, group), (motion, gain) in mistakes.items()
+    ]
+    text = texts[0] if texts else _likelier_mistake(flight, likeliest)
     if text is not None:
         allowed = "allowed: columns, signs and units as in the flights of the model"
         raise BadInput(f"{samples.name}: {text}, {allowed}")

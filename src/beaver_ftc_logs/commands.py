@@ -63,6 +63,7 @@ def identify(
     from beaver_ftc_logs.identification_text import identification_text
     from beaver_ftc_logs.loading import load_flights_for_fit
     from beaver_ftc_logs.model import model_file_text
+    from beaver_ftc_logs.preparation import scale_if_better
     from beaver_ftc_logs.vehicle import with_alarm_rate
     from beaver_ftc_logs.vehicle_of_logs import load_vehicle_for_logs
 

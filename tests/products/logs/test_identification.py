@@ -7,7 +7,7 @@ import pytest
 
 from beaver_ftc_logs import orders
 from beaver_ftc_logs.free_runs import fit_output_error
-from beaver_ftc_logs.identification import scale_if_better
+from beaver_ftc_logs.preparation import scale_if_better
 from products.logs import small
 
 MODEL = small.model()

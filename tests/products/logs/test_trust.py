@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc_logs import column_mistakes, identification, orders, trust, validation
+from beaver_ftc_logs import column_mistakes, identification, orders, validation
 from beaver_ftc_logs.diagnose import diagnose
 from beaver_ftc_logs.findings import as_text, verdict_document
-from beaver_ftc_logs.model import FittedRanges
 from products.logs import small
 
 HEALTHY = small.flight(small.model(), n=1200, seed=2)
@@ -151,10 +150,10 @@ def test_a_command_in_another_unit_is_refused_where_rates_move_alike_or_far_less
     n = np.arange(2000)
     rates = np.column_stack([np.sin(0.01 * (k + 1) * n) for k in range(3)])
     commands = np.column_stack([np.sin(0.03 * n), np.cos(0.02 * n)])
-    fitted = FittedRanges(commands=trust.central_ranges(commands), rates=trust.central_ranges(rates))
-    flown = commands * [1.0, factor], rates * [1.0, turned, 1.0]
+    first = small.flight(small.model(), n=2000, commands=commands, rates=rates, name="log")
+    flown = replace(first, commands=commands * [1.0, factor], rates=rates * [1.0, turned, 1.0])
     if refused:
         with pytest.raises(BadInput, match=rf"log: the command of elevator moves {factor:g} times"):
-            column_mistakes.refuse_command_unit("log", *flown, fitted, ["aileron", "elevator"])
+            column_mistakes.refuse_command_unit(flown, first, ["aileron", "elevator"])
     else:
-        column_mistakes.refuse_command_unit("log", *flown, fitted, ["aileron", "elevator"])
+        column_mistakes.refuse_command_unit(flown, first, ["aileron", "elevator"])

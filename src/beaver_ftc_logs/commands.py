@@ -58,7 +58,7 @@ def identify(
     if vehicle is None or out is None:
         option = "--vehicle" if vehicle is None else "--out"
         raise BadInput(f"identify: {option} is missing, allowed: --vehicle FILE --out MODEL, or --check")
-    from beaver_ftc_logs.identification import identify, scale_if_better
+    from beaver_ftc_logs.identification import identify
     from beaver_ftc_logs.identification_page import refuse_foreign_file, render_identification
     from beaver_ftc_logs.identification_text import identification_text
     from beaver_ftc_logs.loading import load_flights_for_fit
@@ -228,31 +228,30 @@ def _check_options_agree(options: DiagnoseOptions) -> None:
     --score, --reader                      --model or --aircraft
     --detector                             --model
     """
-    own_detector = options.detector == "bank-of-filters"
     by_aircraft = options.aircraft is not None
     by_model = options.model is not None
+    names_detector = options.detector != "bank-of-filters"
     if by_aircraft and by_model:
         raise BadInput("diagnose: --model and --aircraft: allowed: one of them")
-    if by_aircraft and not own_detector:
+    if by_aircraft and names_detector:
         reason = f"--detector {options.detector}: allowed: none, fdi.scheme of --scenario names it"
         raise BadInput(f"diagnose: --aircraft with {reason}")
-    aircraft_only = {
-        f"--scenario {options.scenario}": options.scenario,
-        f"--vehicle {options.vehicle}": options.vehicle,
-        "--certificate": options.certificate or None,
+    needs_aircraft = {
+        f"--scenario {options.scenario}": options.scenario is not None,
+        f"--vehicle {options.vehicle}": options.vehicle is not None,
+        "--certificate": options.certificate,
     }
-    diagnosis_only = {
-        "--score": options.score or None,
-        "--detector": None if own_detector else options.detector,
-        "--reader": options.reader,
+    needs_diagnosis = {
+        "--score": options.score,
+        "--detector": names_detector,
+        "--reader": options.reader is not None,
     }
-    for options_given, is_allowed, allowed in (
-        (aircraft_only, by_aircraft, "only with --aircraft NAME"),
-        (diagnosis_only, by_aircraft or by_model, "only with --model MODEL or --aircraft NAME"),
-    ):
-        for option, value in options_given.items():
-            if value is not None and not is_allowed:
-                raise BadInput(f"diagnose: {option}: allowed: {allowed}")
+    for option, is_given in needs_aircraft.items():
+        if is_given and not by_aircraft:
+            raise BadInput(f"diagnose: {option}: allowed: only with --aircraft NAME")
+    for option, is_given in needs_diagnosis.items():
+        if is_given and not (by_aircraft or by_model):
+            raise BadInput(f"diagnose: {option}: allowed: only with --model MODEL or --aircraft NAME")
 
 
 def _diagnose_with_aircraft(options: DiagnoseOptions) -> None:

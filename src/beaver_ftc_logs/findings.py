@@ -51,39 +51,34 @@ def fault_events(rows: LogRows, surfaces: list[str]) -> list[Document]:
     """The events: periods of an alarm with one name and one effectiveness.
 
     A period of less than MAX_BRIEF_EVENT_S joins the event directly before it. If there is none, it is an
-    event of its own, marked as brief; `_join_runs` has all rules. Events use later samples, which rows do
-    not.
+    event of its own, marked as brief; `_joins` has all rules. Events use later samples, which rows do not.
     """
     _, index = np.unique(rows.isolated_surfaces.astype(str), return_inverse=True)
     columns = np.column_stack([index, rows.faulty, rows.faulty[:, None] * rows.effectiveness])
-    runs = _join_runs(rows, constant_stretches(columns))
+    runs: Runs = []
+    for begin, end in constant_stretches(columns):
+        if runs and _joins(rows, runs[-1], (begin, end)):
+            runs[-1] = (runs[-1][0], end)
+        else:
+            runs.append((begin, end))
     return [_fault_event_entry(rows, begin, end, surfaces) for begin, end in runs if rows.faulty[begin]]
 
 
-def _join_runs(rows: LogRows, runs: Runs) -> Runs:
-    """The runs of rows, in which an alarm that follows another one directly joins it if
+def _joins(rows: LogRows, earlier: tuple[int, int], later: tuple[int, int]) -> bool:
+    """Whether a run of rows joins the run directly before it: both are alarms, and
 
-        the alarm is brief, or
+        the later one is brief, or
         both have the same name and effectiveness, or
-        the other one is brief and its name is `unknown`.
+        the earlier one is brief and its name is `unknown`.
 
-    Name and effectiveness of a joined run are those of its first row. before: the last run of those joined so
-    far, which begins at row `first`; empty for the first run.
+    Name and effectiveness of a run are those of its first row, i or k.
     """
-    joined: Runs = []
-    for begin, end in runs:
-        before = joined[-1] if joined else (begin, begin)
-        first = before[0]
-        names = rows.isolated_surfaces
-        a = rows.effectiveness
-        unnamed = first < begin and names[first] == UNKNOWN_SURFACE and _is_brief(rows, *before)
-        alike = names[first] == names[begin] and (a[first] == a[begin]).all()
-        joins = _is_brief(rows, begin, end) or unnamed or alike
-        if first < begin and rows.faulty[first] and rows.faulty[begin] and joins:
-            joined[-1] = (first, end)
-        else:
-            joined.append((begin, end))
-    return joined
+    i = earlier[0]
+    k = later[0]
+    names = rows.isolated_surfaces
+    is_alike = names[i] == names[k] and (rows.effectiveness[i] == rows.effectiveness[k]).all()
+    is_unnamed = names[i] == UNKNOWN_SURFACE and _is_brief(rows, *earlier)
+    return bool(rows.faulty[i] and rows.faulty[k] and (is_alike or is_unnamed or _is_brief(rows, *later)))
 
 
 def _is_brief(rows: LogRows, begin: int, end: int) -> bool:

@@ -25,7 +25,6 @@ _STEP_JITTER = 0.1  # if a step differs from the usual one by a larger share, sa
 _MIN_SAMPLES = 50  # least number of samples in a stretch
 _DENSITIES_KG_M3 = (0.2, 1.6)  # range of the density of air at any height: a value outside shows another unit
 _STOP_RATIO = 1.1  # a command that exceeds its stop by more is in another unit
-_ATTITUDE_ANGLE_NAMES = ("roll", "pitch", "yaw")
 # The aircraft whose flights are diagnosed, and the errors declared for it: arguments of `Diagnosis`.
 DiagnosedAircraft = tuple[Aircraft, Document]
 
@@ -153,7 +152,7 @@ def _flow_columns(log: RecordedFlight, vehicle: Vehicle, aircraft: Aircraft) -> 
 
 def _attitude_columns(flight: str, columns: dict[str, Column], vehicle: Vehicle) -> Iterator[str]:
     """The columns of the attitude angles. Raises BadInput for one that is missing."""
-    for name, angle in zip(_ATTITUDE_ANGLE_NAMES, named_angles(columns, vehicle), strict=True):
+    for name, angle in zip(("roll", "pitch", "yaw"), named_angles(columns, vehicle), strict=True):
         if angle is None:
             reason = "is missing, allowed: its column, where fdi.bounds declares turbulence"
             raise BadInput(f"{flight}: attitude.{name}: {reason}")

@@ -99,7 +99,7 @@ def build_bank(model: Model) -> HypothesisBank:
         kind,
         transition_share,
         offset,
-        _prior_probabilities(kind, transition_share),
+        _prior_probabilities(transition_share),
         rate,
         own_gain_share,
     )
@@ -121,8 +121,7 @@ def _single_hypotheses(model: Model, groups: list[int], share: float) -> Iterato
 def _effect_row(n: int, levels: dict[int, float]) -> Floats:
     """Effectiveness of each of n groups, (n,): the level of a group in `levels`, otherwise 1."""
     row = np.ones(n)
-    for g, level in levels.items():
-        row[g] = level
+    row[list(levels)] = list(levels.values())
     return row
 
 
@@ -165,11 +164,11 @@ def _pair_hypotheses(n: int, groups: list[int]) -> list[HypothesisRow]:
     return [(row, PAIR_LOSS, _PAIR_SHARE / len(pairs), np.zeros(3)) for row in rows]
 
 
-def _prior_probabilities(kind: np.ndarray, share: Floats) -> Floats:
-    """Probability of each hypothesis before the flight, (H,): _PRIOR_HEALTHY, _PRIOR_NO_RESPONSE, and the
-    remainder for the faults in proportion to share (H,), their shares of all changes of hypothesis."""
-    fault = (kind != HEALTHY) & (kind != NO_RESPONSE)
-    p = share * (1.0 - _PRIOR_HEALTHY - _PRIOR_NO_RESPONSE) / share[fault].sum()
+def _prior_probabilities(share: Floats) -> Floats:
+    """Probability of each hypothesis before the flight, (H,): _PRIOR_HEALTHY of the first,
+    _PRIOR_NO_RESPONSE of the last, and the remainder for the others in proportion to share (H,), their shares
+    of all changes of hypothesis."""
+    p = share * (1.0 - _PRIOR_HEALTHY - _PRIOR_NO_RESPONSE) / share[1:-1].sum()
     p[0] = _PRIOR_HEALTHY
     p[-1] = _PRIOR_NO_RESPONSE
     return p

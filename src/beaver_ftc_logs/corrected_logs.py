@@ -34,9 +34,8 @@ def corrected_logs(samples: Samples, vehicle: Vehicle, unknown: Collection[str])
     surfaces = list(vehicle.surfaces)
     doubtful = [name for name in vehicle.rate_columns if name not in samples.confirmed_rates]
     for i, j in combinations([s for s, name in enumerate(surfaces) if name not in unknown], 2):
-        order = list(range(len(surfaces)))
-        order[i] = j
-        order[j] = i
+        order = np.arange(len(surfaces))
+        order[[i, j]] = j, i
         exchanged = replace(samples, commands=samples.commands[:, order])
         yield CorrectedLog(f"the commands of {surfaces[i]} and {surfaces[j]} exchanged", exchanged)
     for first, second in combinations(doubtful, 2):
@@ -44,13 +43,12 @@ def corrected_logs(samples: Samples, vehicle: Vehicle, unknown: Collection[str])
         yield CorrectedLog(f"{first} and {second} exchanged", exchanged)
     for name in [*doubtful, *vehicle.signal_columns]:
         for factor in UNIT_FACTORS:
-            corrected = CorrectedLog(
-                f"`scale: {factor:.4g}` on {name}", altered_log(samples, vehicle, {}, {name: factor})
-            )
+            text = f"`scale: {factor:.4g}` on {name}"
+            scaled = altered_log(samples, vehicle, {}, {name: factor})
             if name in doubtful:
-                yield corrected._replace(log_jacobian=float(np.log(abs(factor))))
+                yield CorrectedLog(text, scaled, log_jacobian=float(np.log(abs(factor))))
             else:
-                yield corrected._replace(scaled_signal=name)
+                yield CorrectedLog(text, scaled, scaled_signal=name)
 
 
 def altered_log(

@@ -93,14 +93,14 @@ def _add_unknown_surfaces(samples: Samples, model: Model, rows: LogRows) -> LogR
     moved = np.fmax.accumulate(u) - np.fmin.accumulate(u) > _COMMAND_ROUNDING
     moved |= "stuck" in model.vehicle.faults
     unknown = trust.unknown_surfaces(model)
-    addable = moved & np.array([surface in unknown for surface in surfaces])
+    addable = moved & np.isin(surfaces, list(unknown))
     names = rows.isolated_surfaces.copy()
     high = rows.effectiveness_high.copy()
     for k in np.flatnonzero(rows.faulty == 1):
         named = set(str(names[k]).split("+"))
         if not named <= set(surfaces):
             continue
-        in_name = np.array([surface in named or bool(addable[k, i]) for i, surface in enumerate(surfaces)])
+        in_name = np.isin(surfaces, list(named)) | addable[k]
         names[k] = "+".join(compress(surfaces, in_name))
         of_one_group = any(named <= set(group) for group in model.groups)
         if in_name.sum() > len(named) or (model.settings.one_group and not of_one_group):

@@ -30,8 +30,7 @@ def energy_climb_mps(t: Floats, h: Floats, V: Floats, stretch: np.ndarray) -> Fl
     """
     E = h + V**2 / (2.0 * GRAVITY_MPS2)
     i = np.searchsorted(t, t - _WINDOW_S, side="right") - 1
-    whole = (i >= 0) & (stretch[np.maximum(i, 0)] == stretch)
-    i = np.maximum(i, 0)
+    whole = (i >= 0) & (stretch[i] == stretch)
     dt = np.where(whole, t - t[i], 1.0)
     return np.where(whole, (E - E[i]) / dt, np.nan)
 

@@ -9,7 +9,7 @@ from beaver_ftc_logs.trust import unknown_sentences
 
 def identification_text(model: Model) -> str:
     """The identification as text: a line on the fit, and an indented line for each finding."""
-    results: Document = dict(model.identified)
+    results: Document = model.identified
     flights = results["flights"]
     lines = [
         f"{model.vehicle.name}: {sum(flight['samples'] for flight in flights)} samples at "
@@ -72,9 +72,8 @@ def _day_lines(expected: Document, n_flights: int) -> list[str]:
     """Lines on flights that were not fitted. With a single flight, its halves are left out: they show nothing
     about another day.
     """
-    unit = "another half of this day, not of another day"
-    if n_flights > 1:
-        unit = "another day, each left out in turn"
+    half = "another half of this day, not of another day"
+    unit = "another day, each left out in turn" if n_flights > 1 else half
     lines = []
     if "classes" in expected:
         scores = [

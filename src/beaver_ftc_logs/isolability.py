@@ -24,6 +24,7 @@ from beaver_ftc_logs.samples import Samples
 
 DETECTION_HORIZONS_S = (5.0, 20.0, 60.0)  # values of T for which the smallest loss is stated
 _ALIKE_COSINE = 0.9  # two effects with a larger cosine are not separable
+# Sentence on a group of several surfaces.
 _ONE_GROUP_NOTE = (
     "{} get proportional commands while they are healthy: no fit of healthy flight tells their effects "
     "apart. A loss in any of them is named as all of them, and the effectiveness given is that of all "
@@ -86,27 +87,27 @@ def _alarm_odds(model: Model, bank: HypothesisBank, g: int, dt_s: float) -> floa
         with the threshold mu   max(mu - log(share / sum of the shares of all faults), -log(p))
 
     share: median transition share of the hypotheses in which this group loses effectiveness; p: probability
-    that a sample begins a loss of this share. Page's sum counts the evidence for any fault; besides, an alarm
-    needs a fault that is likelier than health (`posterior_rows.rows_of_posterior`).
+    that a sample begins a loss that has this share. Page's sum counts the evidence for any fault; besides, an
+    alarm needs a fault that is likelier than health (`posterior_rows.rows_of_posterior`).
     """
     settings = model.settings
     shares = bank.transition_share[bank.is_fault_of_group(g)]
     if not len(shares):
         return float("inf")
-    share = float(np.median(shares))
-    p = settings.changes_per_hour * dt_s / 3600.0 * share
+    share = np.median(shares)
+    log_p = np.log(settings.changes_per_hour * dt_s / 3600.0 * share)
     if settings.threshold is None:
-        return float(np.log(settings.alarm / (1.0 - settings.alarm)) - np.log(p))
+        return float(np.log(settings.alarm / (1.0 - settings.alarm)) - log_p)
     all_shares = bank.transition_share[bank.is_fault_hypothesis].sum()
-    return float(max(settings.threshold - np.log(share / all_shares), -np.log(p)))
+    return float(max(settings.threshold - np.log(share / all_shares), -log_p))
 
 
 def _smallest_losses(J: float, odds: float) -> dict[str, float | None]:
     """The smallest loss d with d^2 J T / 2 >= odds, for each T in s; None if not even d = 1 is enough."""
     losses: dict[str, float | None] = {}
     for T in DETECTION_HORIZONS_S:
-        d = np.sqrt(2.0 * odds / (J * T)) if J * T > 0.0 else np.inf
-        losses[f"{T:g}"] = float(d) if d <= 1.0 else None
+        d = float(np.sqrt(2.0 * odds / max(J * T, MIN_DIVISOR)))
+        losses[f"{T:g}"] = d if d <= 1.0 else None
     return losses
 
 

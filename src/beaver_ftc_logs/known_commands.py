@@ -95,8 +95,7 @@ def multicopter_reason(params: Parameters, names: Collection[str]) -> str | None
         return f"the parameter {copter} of ArduCopter"
     stripped = [re.sub(r"\s*\(.*\)$", "", name.strip()).lower() for name in names]
     rotors = [name for name in stripped if re.fullmatch(r"e?motor\[?_?\d\]?", name)]
-    commanded = any(map(is_command_name, names))
-    if len(set(rotors)) >= _MIN_ROTORS and not commanded:
+    if len(set(rotors)) >= _MIN_ROTORS and not any(map(is_command_name, names)):
         return f"{rotors[0]} to {rotors[-1]}, and no output of a servo"
     return None
 

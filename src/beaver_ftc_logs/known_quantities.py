@@ -9,8 +9,6 @@ from collections.abc import Iterable, Sequence
 
 from beaver_ftc_logs.known_commands import is_command_name
 
-_MAX_READ_COLUMNS = 60  # largest number of columns that are read of a table
-
 
 def _rate_pattern(rate_name: str, angle: str, axis: str, vector_index: int) -> str:
     """Pattern of the names of a body rate, in plain form.
@@ -57,12 +55,10 @@ def find_quantities(names: list[str]) -> dict[str, str]:
     }
 
 
-def likely_columns(names: Iterable[str], max_columns: int | None = _MAX_READ_COLUMNS) -> list[str]:
-    """The first columns that may be quantities or commands, at most max_columns: a log with many columns is
-    not read as a whole."""
+def likely_columns(names: Iterable[str]) -> list[str]:
+    """The columns that may be quantities or commands."""
     pattern = "|".join(f"({part})" for part in NAME_PATTERNS.values())
-    likely = [name for name in names if re.fullmatch(pattern, plain_form(name)) or is_command_name(name)]
-    return likely[:max_columns]
+    return [name for name in names if re.fullmatch(pattern, plain_form(name)) or is_command_name(name)]
 
 
 def plain_form(name: str) -> str:

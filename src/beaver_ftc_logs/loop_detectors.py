@@ -68,11 +68,11 @@ def loop_detector_inputs(samples: Samples, model: Model) -> list[tuple[Measured,
     rates = np.nan_to_num(samples.rates)
     before = np.vstack([rates[:1], rates[:-1]])
     expected = (rates - flight.e - before) / dt_s
-    Z = np.zeros((len(rates), 3, _N_LOOP))
-    u = np.zeros((len(rates), _N_LOOP))
     F = np.where(flight.is_known[:, None, None], flight.F, 0.0)
-    Z[:, :, : len(members)] = F.transpose(0, 2, 1) / dt_s
-    u[:, : len(members)] = np.nan_to_num(group_commands(samples, members, labelled=False))
+    commands = np.nan_to_num(group_commands(samples, members, labelled=False))
+    others = (0, _N_LOOP - len(members))
+    Z = np.pad(F.transpose(0, 2, 1) / dt_s, ((0, 0), (0, 0), others))
+    u = np.pad(commands, ((0, 0), others))
     sd = _model_error_sd_rad_s2(model)
     t_s = samples.t_s.tolist()
     frames = [

@@ -63,6 +63,7 @@ _UNIT_OF_PART = {"rad_s": "rad/s", "rad/s": "rad/s", "deg_s": "deg/s", "deg/s": 
 _PWM_RANGE_US = (700.0, 2300.0)  # a command whose median is between these is a pulse
 _MIN_CORRELATION = 0.7  # a rate and its angle belong together if their correlation is larger
 _MAX_COMMANDS = 8  # largest number of proposed commands
+_MAX_READ_COLUMNS = 60  # of a table with more likely columns, only the first are read
 _LOG_STEPS_S = (1.0 / 2000.0, 1.0 / 4.0)  # shortest and longest usual step of a log
 
 
@@ -105,12 +106,12 @@ def read_likely(path: Path, reader: str | None) -> LikelyLog:
         log = read_flight(path, reader, columns=())
         names = list(log.columns)
         mixing = mixing_of_log(reader, log.parameters, names)
-        wanted = [*likely_columns(names, None), *mixing.entry_by_column, *({VTOL_MODE} & {*names})]
+        wanted = [*likely_columns(names), *mixing.entry_by_column, *({VTOL_MODE} & {*names})]
         log = read_flight(path, reader, columns=wanted)
         return LikelyLog(reader, None, log, names, mixing)
     time = columns = None
     if reader == "table":
-        columns = likely_columns(column_names(path))
+        columns = likely_columns(column_names(path))[:_MAX_READ_COLUMNS]
         time = _find_time(path)
     log = next(read_parts(path, reader, time, columns))
     return LikelyLog(reader, time, log, list(log.columns), Mixing())

@@ -38,8 +38,6 @@ def test_noise_is_as_much_larger_as_it_is_and_as_its_sums_are(span, times):
     residual = 3.0 * held
     scale = recent_scale(residual, np.ones(6000, bool), 100.0)
     assert np.median(scale[1000:]) == pytest.approx(9.0 * times, rel=0.15)
-    cut = recent_scale(residual[:500], np.ones(500, bool), 100.0)
-    assert np.allclose(cut, scale[:500])
     known = np.arange(6000) % 200 < 100
     gaps = recent_scale(residual * known[:, None], known, 100.0)
     assert np.median(gaps[1000:]) == pytest.approx(9.0 * times, rel=0.15)

@@ -42,17 +42,9 @@ def test_the_document_of_a_verdict(changed, flown):
 def test_what_motion_alone_tells_is_what_is_left_of_the_regression(flown):
     """The Schur complement of the whole information matrix, trim of each axis and the other groups out."""
     model, samples = flown
-    ok_answers = _white_responses(samples, model)
-    n, groups, _ = ok_answers.shape
-    design = np.concatenate([ok_answers.transpose(0, 2, 1), np.tile(np.eye(3), (n, 1, 1))], axis=2)
-    flat = design.reshape(-1, groups + 3)
-    covariance = np.linalg.inv(flat.T @ flat)
-    for group, entry in enumerate(isolability_document(samples, model)["groups"]):
-        left = 1.0 / covariance[group, group] / n / samples.dt_s
-        assert entry["information_per_s_of_its_motion"] == pytest.approx(left, rel=1e-9)
-
-
-def _white_responses(samples, model):
     flight = innovations(samples, model)
-    root = np.linalg.inv(np.linalg.cholesky(np.array(model.noise))) * np.sqrt(model.settings.power)
-    return flight.F[flight.is_known] @ root.T
+    Z = flight.at(np.flatnonzero(flight.is_known)).columns().reshape(-1, 3 + len(model.groups))
+    covariance = np.linalg.inv(Z.T @ Z)
+    for group, entry in enumerate(isolability_document(samples, model)["groups"], 3):
+        left = model.settings.power / covariance[group, group] / (len(Z) / 3) / samples.dt_s
+        assert entry["information_per_s_of_its_motion"] == pytest.approx(left, rel=1e-9)

@@ -64,11 +64,11 @@ def test_the_smallest_loss_by_its_closed_form(sampled, wing_model):
     first = max(lags, wing_model.history)
     information = []
     for k in range(first, len(samples.t_s)):
-        moved = sum(samples.commands[k - j, 0] * response[0][j - 1] for j in range(1, lags + 1))
+        moved = samples.commands[k - lags : k, 0][::-1] @ response[0]
         information.append(moved @ inverse @ moved)
-    shares = build_bank(wing_model).transition_share
-    faults = shares[build_bank(wing_model).is_fault_hypothesis].sum()
-    share = np.median(shares[build_bank(wing_model).is_fault_of_group(0)])
+    bank = build_bank(wing_model)
+    share = np.median(bank.transition_share[bank.is_fault_of_group(0)])
+    faults = bank.transition_share[bank.is_fault_hypothesis].sum()
     for rate_hz, threshold in ((10.0, None), (20.0, None), (10.0, 30.0), (10.0, 1.0)):
         settings = wing_model.settings.model_copy(update={"threshold": threshold})
         model = wing_model.model_copy(update={"settings": settings})

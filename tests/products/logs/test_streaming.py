@@ -12,18 +12,11 @@ def flown(sampled):
 
 
 def by_hand(samples, model, k):
-    """Residual of sample k and the groups' answers, summed term by term from the model file."""
-    predicted = np.array(model.intercept)
-    past = [samples.rates[k - lag] for lag in range(1, model.history + 1)]
-    predicted = predicted + np.concatenate(past) @ np.array(model.past)
-    answers = [
-        sum(
-            samples.commands[k - lag, g] * np.array(model.response[g][lag - 1])
-            for lag in range(1, model.lags + 1)
-        )
-        for g in range(len(model.groups))
-    ]
-    return samples.rates[k] - predicted - sum(answers), answers
+    """Residual of sample k and the groups' answers, from the coefficients of the model file."""
+    past = samples.rates[k - model.history : k][::-1].ravel() @ np.array(model.past)
+    u = samples.commands[k - model.lags : k][::-1]
+    answers = [u[:, g] @ np.array(response) for g, response in enumerate(model.response)]
+    return samples.rates[k] - model.intercept - past - sum(answers), answers
 
 
 def test_the_innovation_is_the_residual_of_the_model(flown, wing_model):

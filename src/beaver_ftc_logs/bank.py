@@ -82,8 +82,7 @@ def build_bank(model: Model) -> HypothesisBank:
     groups = [g for g in range(n) if known[g] or not any(known)]
     rows: list[HypothesisRow] = [(np.ones(n), HEALTHY, settings.repair_share, np.zeros(3))]
     stuck = "stuck" in model.vehicle.faults
-    pairs = len(groups) > 1
-    single_share = 1.0 - (_PAIR_SHARE if pairs else 0.0) - (_OFFSET_SHARE if stuck else 0.0)
+    single_share = 1.0 - _PAIR_SHARE * (len(groups) > 1) - _OFFSET_SHARE * stuck
     rows += _single_hypotheses(model, groups, single_share)
     rows += _pair_hypotheses(n, groups)
     if stuck:
@@ -95,13 +94,13 @@ def build_bank(model: Model) -> HypothesisBank:
     rate = settings.changes_per_hour / (3600.0 * model.rate_hz)
     own_gain_share = np.ones_like(effectiveness) if model.vehicle.other_laws else effectiveness
     return HypothesisBank(
-        effectiveness,
-        kind,
-        transition_share,
-        offset,
-        _prior_probabilities(transition_share),
-        rate,
-        own_gain_share,
+        effectiveness=effectiveness,
+        hypothesis_kind=kind,
+        transition_share=transition_share,
+        rate_offset_variance=offset,
+        prior_probability=_prior_probabilities(transition_share),
+        change_probability_per_sample=rate,
+        own_gain_share=own_gain_share,
     )
 
 
@@ -218,7 +217,13 @@ def build_states(model: Model, noise: NoiseModel) -> StateModel:
     walk[:3] = r * np.array(settings.trim_walk) ** 2
     bound = np.array([settings.trim_bound] * 3 + [settings.gain_bound] * (1 + n))
     x = np.array([0.0, 0.0, 0.0, 1.0] + [0.0] * n)
-    return StateModel(x, P, np.sqrt(np.diag(P)) * bound, a, walk)
+    return StateModel(
+        initial_mean=x,
+        initial_covariance=P,
+        max_deviation=np.sqrt(np.diag(P)) * bound,
+        deviation_retention=a,
+        random_walk_variance=walk,
+    )
 
 
 class ResidualNoise(NamedTuple):

@@ -53,12 +53,12 @@ def _check_recording(log: RecordedFlight, vehicle: Vehicle) -> tuple[bool, list[
     size = (
         f"{len(samples.t_s)} samples at {1.0 / samples.dt_s:.3g} Hz over {span_s:.4g} s; gaps: {n_gaps}{gap}"
     )
-    lines = [
+    still = [
         f"rate {axis} does not move: nothing can be identified or diagnosed"
         for axis, rate in zip("pqr", samples.rates.T, strict=True)
         if np.unique(rate[np.isfinite(rate)]).size < 2
     ]
-    return not lines, [size, *samples.notes, *_compare_angles(log, vehicle), *lines]
+    return not still, [size, *samples.notes, *_compare_angles(log, vehicle), *still]
 
 
 def _compare_angles(log: RecordedFlight, vehicle: Vehicle) -> list[str]:

@@ -131,7 +131,7 @@ class Answers(NamedTuple):
     n_white: float
 
 
-def answers(samples: Samples, model: Model, max_samples: int | None = None) -> Answers | None:
+def answers(samples: Samples, model: Model, max_samples: float = np.inf) -> Answers | None:
     """The responses in the parts of a flight; None if a part is too short.
 
     max_samples: half of the largest number of samples to use. Of a longer flight, only every `step`-th is
@@ -139,7 +139,7 @@ def answers(samples: Samples, model: Model, max_samples: int | None = None) -> A
     """
     flight = regression.innovations(samples, model)
     rows = np.flatnonzero(flight.is_known)
-    step = max(len(rows) // max_samples, 1) if max_samples else 1
+    step = max(int(len(rows) // max_samples), 1)
     if (parts := regression.split_parts(rows[::step])) is None:
         return None
     share = model.settings.power / flight.noise.wider

@@ -98,8 +98,11 @@ def diagnose_by_freeze_rule(log: RecordedFlight, samples: Samples, model: Model)
     """Rows by the freeze rule on the logged servo outputs; None if the vehicle file names none, or none is
     logged."""
     surfaces = list(model.vehicle.surfaces)
-    named = {name: output.column for name, output in model.vehicle.outputs.items()}
-    outputs = {name: log.columns[column] for name, column in named.items() if column in log.columns}
+    outputs = {
+        name: log.columns[output.column]
+        for name, output in model.vehicle.outputs.items()
+        if output.column in log.columns
+    }
     if not outputs:
         return None
     frozen = np.zeros((len(samples.t_s), len(surfaces)), dtype=bool)

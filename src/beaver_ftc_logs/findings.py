@@ -124,7 +124,8 @@ def as_text(verdict: Document) -> str:
     lines += [f"  {text}" for text in (*verdict["can_separate"], *verdict["notes"])]
     for key, value in verdict.get("score", {}).items():
         lines.append(f"  {key}: {value:.3f}" if isinstance(value, float) else f"  {key}: {value}")
-    lines += [f"  report: {verdict['folder']}/report.html"] if "folder" in verdict else []
+    if "folder" in verdict:
+        lines.append(f"  report: {verdict['folder']}/report.html")
     return "\n".join(lines)
 
 

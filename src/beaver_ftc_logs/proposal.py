@@ -15,13 +15,7 @@ import numpy as np
 from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document
 from beaver_ftc_logs import physics
-from beaver_ftc_logs.known_commands import (
-    VTOL_MODE,
-    command_names,
-    hovers_throughout,
-    missing_commands_text,
-    multicopter_reason,
-)
+from beaver_ftc_logs.known_commands import command_names, missing_commands_text
 from beaver_ftc_logs.known_quantities import NAME_PATTERNS, find_quantities, likely_columns, plain_form
 from beaver_ftc_logs.mixing import Mixing, mixing_of_log
 from beaver_ftc_logs.readers import (
@@ -45,6 +39,7 @@ from beaver_ftc_logs.recording import (
     largest_magnitude,
     nearest_names_text,
 )
+from beaver_ftc_logs.rotorcraft import VTOL_MODE, hovers_throughout, multicopter_reason
 from beaver_ftc_logs.time_base import median_step_s
 from beaver_ftc_logs.unit_mistakes import FAST_RAD_S
 from beaver_ftc_logs.units import (

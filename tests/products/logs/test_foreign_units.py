@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from beaver_ftc_logs.check import check_log
-from beaver_ftc_logs.known_commands import VTOL_MODE, hovers_throughout
 from beaver_ftc_logs.recording import Column
+from beaver_ftc_logs.rotorcraft import VTOL_MODE, hovers_throughout
 
 T = np.arange(400) / 20.0
 WAVES = np.sin(T), np.cos(T), np.sin(2.0 * T)

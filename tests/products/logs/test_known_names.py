@@ -5,9 +5,10 @@ import pytest
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs.check import check_log
-from beaver_ftc_logs.known_commands import is_command_name, multicopter_reason
+from beaver_ftc_logs.known_commands import is_command_name
 from beaver_ftc_logs.readers import check_exists, read_parts, reader_name_for_path
 from beaver_ftc_logs.readers.time_text import seconds_of_text
+from beaver_ftc_logs.rotorcraft import multicopter_reason
 from products.logs import synthetic
 from products.logs.small import run
 from products.logs.test_check import KINEMATIC, RATES, T_S, logged

@@ -2,10 +2,9 @@
 
 import pytest
 
-from beaver_ftc.results.metrics import measure
 from beaver_ftc.studies.mismatch import study
-from beaver_ftc.studies.mismatch.split import UNEXPLAINED, split
-from flying import Memory, fly, loss, scenario
+from beaver_ftc.studies.mismatch.split import UNEXPLAINED, split_flight
+from flying import loss, scenario
 
 FAULTS = [
     {"type": "bias", "actuator": "elevator", "bias_deg": 1, "at_s": 0.4, "end_s": 0.8},
@@ -34,16 +33,9 @@ def case():
     )  # fmt: skip
 
 
-@pytest.fixture(scope="module")
-def flown(case):
-    log = Memory()
-    return fly(case, log), log
-
-
-def test_what_each_source_adds(case, flown, changed):
+def test_what_each_source_adds(case, changed):
     """But for what rounding leaves, which is no number to hold."""
-    found = split(case, {name: flown[1][name] for name in flown[1].columns})
-    document = study.document(case, found, measure(flown[0]))
+    document = study.document(case, *split_flight(case))
     assert 0.0 < document.pop("closure") < 1e-9
     assert all(axis.pop(UNEXPLAINED)["max"] < 1e-9 for axis in document["axes"].values())
     assert not changed(document)

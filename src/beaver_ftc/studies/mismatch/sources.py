@@ -10,10 +10,10 @@ changes one thing and keeps the changes of the steps before it, so that their su
       simplification     not frozen, not linearised
       engine             with the engine terms
       coefficients       with the truth's coefficients, term by term
-      inertia            with the mass and inertia of the aircraft file, without `uncertainty.inertia`
+      inertia            with the true inertia and centre of gravity
       inertia_coupling   with the declared errors of Pqr, Qpr, Rpq
       sinusoids          with the declared sinusoids
-      wind_turbulence    with the rates of the turning air in the damping terms; 0 if the log lacks them
+      wind_turbulence    with the rates of the turning air in the damping terms
       earth_rotation     on a turning Earth
       integration        as JSBSim's integration moves the rates
 
@@ -39,9 +39,13 @@ reported rates w, the rotation W of the Earth in body axes and w_i = w + W, all 
     wdot = J^-1 (M - w_i x J w_i) + w_i x W            [SL03, sec. 1.5]
 
 The design model has J^-1 (M - w x J w). The difference is the source `earth_rotation`.
+
+A centre of gravity at c (m) from that of the aircraft file, with the aerodynamic force F (N), both (3,) along
+the body axes, adds the moment F x c (N m).
 """
 
 from collections.abc import Iterator
+from dataclasses import replace
 from math import exp, inf, radians
 from typing import Any
 
@@ -57,6 +61,7 @@ from beaver_ftc.design.model import (
     anchor,
     design_of,
     design_record,
+    inertia_coefficients,
     inertia_of,
     inertial,
     responses_at,
@@ -155,7 +160,7 @@ class Models:
 
     - design: the design model, which may be linearised about the trim or have a frozen alpha.
     - untied: neither linearised nor frozen. whole: with the terms of the engine. turning: with the
-      coefficients of the truth. truth: with the mass and inertia of the aircraft file.
+      coefficients of the truth. truth: with the inertia of the truth.
     - parts: by name of each coefficient that differs, `whole` with this coefficient of the truth.
     - inertia: inertia coefficients of `truth`.
     """
@@ -174,7 +179,12 @@ class Models:
         self.whole, self.turning = (
             design_record(scale=scale, mass=mass)[0] for scale in (design_scale, true)
         )
-        self.truth = design_record(scale=true)[0]
+        of_file = load().mass
+        true_inertia = {
+            f"{name}_kg_m2": ratio * getattr(of_file, f"{name}_kg_m2")
+            for name, ratio in scenario.uncertainty.inertia
+        }
+        self.truth = design_record(scale=true, mass=replace(of_file, **true_inertia))[0]
         self.inertia = inertia_of(self.truth)
         self.parts = {
             term.name: design_record(scale=design_scale | {term.name: true.get(term.name, 1.0)}, mass=mass)[0]
@@ -204,12 +214,13 @@ def unanticipated_effects(m: Models, states: States) -> Contributions:
         if fault.type == UNANTICIPATED:
             extra: Any = fault
             pitch = unanticipated_at(m.design, states.y, extra.Cm_alpha3 * share(fault, states.t_s))
-            effects[name_of(fault)] = np.outer(pitch, (0.0, 1.0, 0.0))
+            name = name_of(fault)
+            effects[name] = effects.get(name, 0.0) + np.outer(pitch, (0.0, 1.0, 0.0))
     return effects
 
 
 def name_of(fault: Any) -> str:
-    """A unique name of a fault: surface, type and time."""
+    """The name of a fault: surface, type and time. Faults of the same name are one part of the source."""
     place = "" if place_of(fault) == fault.type else f"{place_of(fault)} "
     return f"{place}{fault.type.replace('_', ' ')} at {fault.at_s:g} s"
 
@@ -245,11 +256,19 @@ def _displaced(faults: list, t_s: np.ndarray, way: np.ndarray) -> Parts:
         yield fault, np.where(owner == i, way, 0.0)
 
 
+def off_centre(m: Models, s: States) -> np.ndarray:
+    """The part of the source `inertia` that comes from the centre of gravity, (n, 3) rad/s2: J^-1 (F x c)."""
+    inertia = m.inertia
+    L, M, N = np.cross(s.force, m.scenario.uncertainty.cg_m).T
+    return np.column_stack([inertia.Pl * L + inertia.Pn * N, inertia.Qm * M, inertia.Rl * L + inertia.Rn * N])
+
+
 def inertia_coupling(m: Models, s: States) -> np.ndarray:
-    """The source `inertia_coupling`, (n, 3) rad/s2: theta times the rate products [Zhang2005, sec. VII]."""
+    """The source `inertia_coupling`, (n, 3) rad/s2: theta times the rate products [Zhang2005, sec. VII] with
+    the inertia of the aircraft file."""
     p, q, r = s.x.T
     theta = m.scenario.uncertainty.inertia_coupling
-    inertia = m.inertia
+    inertia = inertia_coefficients(load().mass)
     return np.column_stack(
         [theta.p * inertia.Pqr * q * r, theta.q * inertia.Qpr * p * r, theta.r * inertia.Rpq * p * q]
     )
@@ -303,7 +322,7 @@ def instantaneous(m: Models, s: States) -> tuple[Contributions, dict[str, Contri
         "simplification": untied - tied,
         "engine": whole - untied,
         "coefficients": turning - whole,
-        "inertia": truth - turning + extra,
+        "inertia": truth - turning + extra + off_centre(m, s),
         "inertia_coupling": inertia_coupling(m, s),
         "sinusoids": sinusoids(m, s),
         "wind_turbulence": wind_turbulence(m, s),

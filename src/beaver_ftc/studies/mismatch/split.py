@@ -17,7 +17,7 @@ from beaver_ftc.results.model import Metrics
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.mismatch.sources import SOURCES, Contributions, Models, instantaneous
-from beaver_ftc.studies.mismatch.states import Log, states_of
+from beaver_ftc.studies.mismatch.states import Log, Unlogged, states_of
 from beaver_ftc.studies.present.tables import finite
 
 UNEXPLAINED, TOTAL, ETA_BAR, FAULT = "unexplained", "total", "eta_bar", "fault"
@@ -135,8 +135,8 @@ class Split:
         return np.column_stack([self.t_s, values.reshape(len(values), -1)])
 
 
-def split(scenario: Scenario, log: Log) -> Split:
-    """Split the mismatch of a flight; log: its columns (n,).
+def split(scenario: Scenario, log: Log, unlogged: Unlogged) -> Split:
+    """Split the mismatch of a flight; log: its columns (n,); unlogged: what the log lacks.
 
     total[k] = (x[k+1] - x[k]) rate_hz - design_mean[k+1],     sampled[k] = xdot[k] - (f + G u)[k]
     integration = total - sampled,                             eta_bar[k]: the bound at row k+1
@@ -146,7 +146,7 @@ def split(scenario: Scenario, log: Log) -> Split:
     (f + G u)[k]: of the design model at the measured state and the command.
     """
     m = Models(scenario)
-    s = states_of(log)
+    s = states_of(log, unlogged)
     contributions, details = instantaneous(m, s)
     sampled = s.xdot - acceleration_at(m.design, s.x_measured, s.y_measured, s.u)
     over_frames = np.diff(s.x, axis=0) * scenario.rate_hz - s.design_mean[1:]
@@ -165,9 +165,9 @@ def split(scenario: Scenario, log: Log) -> Split:
 
 def split_flight(scenario: Scenario) -> tuple[Split, Metrics]:
     """Fly a scenario without a log file: its split, and its metrics."""
-    log = Columns()
-    flight = fly(scenario, log)
-    return split(scenario, log), measure(flight)
+    log, unlogged = Columns(), Unlogged()
+    flight = fly(scenario, log, watch=unlogged.watch)
+    return split(scenario, log, unlogged), measure(flight)
 
 
 def _runs(mask: np.ndarray) -> list[tuple[int, int]]:

@@ -41,7 +41,7 @@ from beaver_ftc.studies.mismatch.split import (
     split,
     split_flight,
 )
-from beaver_ftc.studies.mismatch.states import LOGGED
+from beaver_ftc.studies.mismatch.states import LOGGED, Unlogged
 from beaver_ftc.studies.mismatch.tables import mismatch_section
 from beaver_ftc.studies.present.page import Files, write_files
 from beaver_ftc.studies.present.tables import as_csv, finite
@@ -73,11 +73,11 @@ def run_mismatch(
     Raises BadInput for a flight that cannot be trimmed, SimulationFailed for one not completed or kept.
     """
     with result_folder(out, scenario.name) as folder:
+        unlogged = Unlogged()
         with ParquetLog(folder / "log.parquet") as log:
-            flight = fly(scenario, log, progress)
+            flight = fly(scenario, log, progress, watch=unlogged.watch)
         metrics = measure(flight)
-        stored = StoredLog(folder / "log.parquet")
-        flight_split = split(scenario, stored.read([name for name in stored.columns if name in LOGGED]))
+        flight_split = split(scenario, StoredLog(folder / "log.parquet").read(LOGGED), unlogged)
         with ParquetLog(folder / "mismatch.parquet") as frames:
             frames.open(COLUMNS)
             frames.write(flight_split.rows())

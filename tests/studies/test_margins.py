@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from beaver_ftc.control.laws import loop_design
+from beaver_ftc.design.engine import slipstream
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.studies.margins import at, over_airspeeds
+from beaver_ftc.studies.margins import at, outputs, over_airspeeds
 from beaver_ftc.studies.margins_loop import OpenLoop, frequencies, loops
 from flying import flown, scenario
 
@@ -38,6 +39,12 @@ def test_every_loop_over_the_envelope_keeps_what_is_asked(given):
     assert {each.surface for each in found} == {"aileron", "elevator", "rudder", "flap"}
     assert len({each.airspeed_mps for each in found}) == 5
     assert [each for each in found if not each.keeps(6.0, 45.0)] == []
+
+
+def test_the_slipstream_falls_with_airspeed_as_by_its_equation():
+    lower, dpt, higher = (slipstream(160.0, 1.0, V) for V in (44.99, 45.0, 45.01))
+    C = outputs((*"pqr", "alpha", "beta", "airspeed"), np.array([0.0, 0.0, 45.0, 1012.5, dpt]))
+    assert C[-1, -1] == pytest.approx((higher - lower) / 0.02, rel=1e-6)
 
 
 def test_a_law_that_has_no_such_loop_is_refused():

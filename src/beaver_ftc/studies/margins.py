@@ -19,6 +19,7 @@ from beaver_ftc.control import flown_by
 from beaver_ftc.control.laws.loop_design import margins
 from beaver_ftc.control.laws.rejecting import STAND_IN
 from beaver_ftc.control.readout import DefaultLaw
+from beaver_ftc.design.engine import DPT_0
 from beaver_ftc.design.model import jacobian
 from beaver_ftc.design.table import AIRSPEED, DPT, QDYN
 from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
@@ -160,16 +161,16 @@ def outputs(states: tuple[str, ...], y: np.ndarray) -> np.ndarray:
     """C (7 + declared signals, states) of the measured signals: rates, alpha, beta, V, qdyn and the declared
     signals.
 
-    d qdyn / dV = 2 qdyn / V, as qdyn ~ V^2. d dpt / dV = -3 dpt / V of the slipstream, the one declared
-    signal of the Beaver, which is ~ V^-3; every declared signal is treated like it. The dependence on
-    altitude is left out.
+    d qdyn / dV = 2 qdyn / V, as qdyn ~ V^2. d dpt / dV = -3 (dpt - DPT_0) / V of the slipstream, the one
+    declared signal of the Beaver, as dpt - DPT_0 ~ V^-3; every declared signal is treated like it. The
+    dependence on altitude is left out.
     """
     C = np.zeros((3 + len(y), len(states)))
     for row, name in enumerate((*AXES, "alpha", "beta", "airspeed")):
         C[row, states.index(name)] = 1.0
     C_V = C[3:, states.index("airspeed")]  # a view: d y / dV
     C_V[QDYN] = 2.0 * y[QDYN] / y[AIRSPEED]
-    C_V[DPT:] = -3.0 * y[DPT:] / y[AIRSPEED]
+    C_V[DPT:] = -3.0 * (y[DPT:] - DPT_0) / y[AIRSPEED]
     return C
 
 

@@ -54,7 +54,7 @@ def _tables_of_other_days(document: Document) -> list[tuple[str, HeaderAndRows]]
         for summary in data["summary"]:
             days += [summary[key] | {"day": f"{summary['kind']}: {key}"} for key in ("mean", "worst")]
         rows = [[cell_of(day) for cell_of in columns.values()] for day in days]
-        title = f"{data['set']}: other days made of it, halves left out in turn"
+        title = f"{data['set']}: other days made of it, each part left out in turn"
         tables.append((title, (["day", *[*columns][1:]], rows)))
     return tables
 

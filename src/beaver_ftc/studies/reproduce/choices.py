@@ -9,8 +9,8 @@ from beaver_ftc.documents.validation import parse_key, with_values
 from beaver_ftc.plugins import DETECTORS, LAWS, options_of
 from beaver_ftc.scenario.schema import Scenario
 
-FAULT_AT_S = 12.0  # begin of the fault in each published case; cases.yaml repeats it
-AMPLITUDE_DEG_S = 3.0  # of each sine of the references
+FAULT_AT_S = 12.0  # begin of the fault in each published case with a fault; cases.yaml repeats it
+AMPLITUDE_DEG_S = 3.0  # of the reference of each body rate, a sine
 ABLATION = "ablation"  # `origin` of an option that removes a part of the scheme
 
 # Given in section VII: the sinusoids of eta, the bound on the uncertainty, scheme and law.
@@ -39,32 +39,34 @@ def _sine(frequency_hz: float) -> list[Document]:
 
 
 CHOICES = (
-    Choice("initial.airspeed_mps", 45.0, "well inside the validated 30 to 55 m/s, margin on both sides"),
+    Choice("initial.airspeed_mps", 45.0, "10 m/s or more from the ends of the validated 30 to 55 m/s"),
     Choice("initial.altitude_m", 1828.8, "6000 ft, a usual cruising altitude of a Beaver"),
     Choice("initial.engine_rpm", 1800.0, "the engine setting of the FDC trim examples"),
     Choice("initial.manifold_pressure_inhg", 20.0, "the engine setting of the FDC trim examples"),
     Choice("initial.flap_deg", 0.0, "the flap is free to take over from the elevator"),
-    Choice("duration_s", 30.0, "three and a half periods of the pitch reference after the fault"),
-    Choice("rate_hz", 100.0, "not given; ten times the fastest pole of the scheme"),
-    Choice(
-        "reference.p", _sine(0.25), "small enough to stay in the envelope; 2.5 times the RMS a fault costs"
-    ),
-    Choice("reference.q", _sine(0.2), "excites the elevator, at a period the figure's 30 s show well"),
+    Choice("duration_s", 30.0, "the fault lasts more than three periods of the pitch reference"),
+    Choice("rate_hz", 100.0, "ten frames in the time constant of an estimator, 0.1 s"),
+    Choice("reference.p", _sine(0.25), "flights with the published faults and law stay inside the envelope"),
+    Choice("reference.q", _sine(0.2), "the elevator moves, and the 30 s of a figure show six periods"),
     Choice("reference.r", _sine(0.15), "a period of its own, so that the axes are not in step"),
     Choice(
         "uncertainty.inertia_coupling",
         {"p": 0.25, "q": -0.25, "r": 0.25},
         "only the range is given: these are corners of it",
     ),
-    Choice("fdi.detection_pole_per_s", 10.0, "a few times the bound shows within 0.1 s"),
-    Choice("fdi.isolation_pole_per_s", 10.0, "the detection estimator's"),
-    Choice("control.proportional_per_s", 2.0, "error bandwidth well above the references' 0.25 Hz"),
-    Choice("control.integral_per_s2", 1.0, "Kp^2/4: two equal real error poles"),
+    Choice(
+        "fdi.detection_pole_per_s",
+        10.0,
+        "a time constant of 0.1 s, short beside the references' periods",
+    ),
+    Choice("fdi.isolation_pole_per_s", 10.0, "that of the detection estimator"),
+    Choice("control.proportional_per_s", 2.0, "error poles at -1 1/s, fast beside the 18 s after the fault"),
+    Choice("control.integral_per_s2", 1.0, "Kp^2/4: the two error poles are real and equal"),
     Choice(
         "control.reference_natural_frequency_rad_s", 10.0, "faster than the loop, slower than the frame rate"
     ),
     Choice("control.reference_damping", 1.0, "no overshoot"),
-    Choice("control.hand_over_s", 1.0, "continuous, and short beside the reference's period"),
+    Choice("control.hand_over_s", 1.0, "continuous, and short beside the periods of the references"),
 )
 
 
@@ -106,12 +108,12 @@ def gains() -> list[Gain]:
 
 
 def _with_keys(document: Document, values: Mapping[str, Any]) -> Document:
-    """A document with other values. values: by dotted key."""
+    """A document with other values, by dotted key."""
     return with_values(document, {parse_key(key): value for key, value in values.items()})
 
 
 # GIVEN and CHOICES together, as the sections of a scenario.
-SETTING = _with_keys(_with_keys({}, GIVEN), {c.key: c.value for c in CHOICES})
+SETTING = _with_keys({}, {**GIVEN, **{choice.key: choice.value for choice in CHOICES}})
 
 
 def scenario(name: str, changes: Mapping[str, Any]) -> Scenario:

@@ -35,11 +35,12 @@ ABLATIONS = tuple(Changed(name, row["changes"]) for name, row in _FILE["ablation
 class Measure(NamedTuple):
     """How a number is measured.
 
-    - of: the function of flights and axes. quantity, unit: of the number. at_least: whether it must be at
-      least its limit, otherwise at most. none: the word for an infinite number.
+    - name: in claims.yaml. of: the function of flights and axes. quantity, unit: of the number. at_least:
+      whether it must be at least its limit, otherwise at most. none: the word for an infinite number.
     - beside: ending of the names of flights with which the flights of a claim are compared; empty for none.
     """
 
+    name: str
     of: Callable[..., float]
     quantity: str
     unit: str = ""
@@ -48,10 +49,10 @@ class Measure(NamedTuple):
     beside: str = ""
 
 
-MEASURES = {name: Measure(getattr(measures, name), **row) for name, row in _FILE["measures"].items()}
+MEASURES = {name: Measure(name, getattr(measures, name), **row) for name, row in _FILE["measures"].items()}
 
 
-NO_MEASURE = Measure(lambda: nan, "")  # of a statement with nothing to measure
+NO_MEASURE = Measure("", lambda: nan, "")  # of a statement with nothing to measure
 
 
 class Claim(NamedTuple):

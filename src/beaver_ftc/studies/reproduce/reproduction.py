@@ -168,7 +168,7 @@ def _judged(claim: Claim, by_setting: Mapping[str, tuple[float, float]]) -> Docu
     measure, verdict = claim.measure, claim.verdict(number, without, elsewhere)
     everywhere = [n for n, _ in elsewhere] or [number]
     return {
-        "measure": measure.of.__name__,
+        "measure": measure.name,
         "quantity": measure.quantity,
         "unit": measure.unit,
         "flights": list(claim.names),

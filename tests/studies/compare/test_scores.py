@@ -6,12 +6,14 @@ import pytest
 
 from beaver_ftc.studies.compare.replay import Trace
 from beaver_ftc.studies.compare.scores import (
+    better_than_ours,
     line_of,
     matched,
     point_at,
     trade_off,
+    who_is_better,
 )
-from beaver_ftc.studies.compare.trial import Entry, Result
+from beaver_ftc.studies.compare.trial import LAW, SCHEME, STATISTICAL, Entry, Result
 from beaver_ftc.studies.engine.statistics import share_within
 
 ENTRY = Entry("a", "b")
@@ -86,3 +88,21 @@ def test_flights_without_a_number_on_either_side_give_no_ratio():
     line = line_of(ENTRY, mine, [*oracle, _result(error="lost", rms_deg_s=2.0), *oracle[:2]])
     assert (line["ratio_median"], line["ratio_90"]) == (3.0, 3.0)
     assert (line["flights"], line["failed"]) == (4, 2)
+    ours = [_result(rms_deg_s=8.0)] * 6
+    assert line_of(ENTRY, mine, oracle + oracle[:3], ours)["against_ours"] | {"p": 1} == {
+        "worse": 2,
+        "better": 2,
+        "p": 1,
+    }
+
+
+def test_yardsticks_and_parts_of_ours_are_no_rivals():
+    entries = [Entry(scheme, LAW) for scheme in (SCHEME, STATISTICAL, "none", "x")]
+    entries += [
+        Entry(SCHEME, law) for law in ("fault-tolerant-published", "oracle-published", "fault-tolerant-y")
+    ]
+    soon = {"delay_s": 0.05, "rms_deg_s": 0.5}
+    lines = [line_of(e, [_result(**soon if e != entries[0] else {})], [_result()]) for e in entries]
+    sentences = better_than_ours(lines, {})
+    assert {sentence.partition(" has ")[0] for sentence in sentences} == {"x", "fault-tolerant-y"}
+    assert "fault-tolerant-y 0.50" in who_is_better(lines)["laws"]

@@ -11,7 +11,7 @@ from statistics import median as middle
 from beaver_ftc.results.metrics import versions
 from beaver_ftc.results.model import Document
 from beaver_ftc.studies.compare.replay import Trace, alarms_at
-from beaver_ftc.studies.compare.trial import LAW, ORACLE, SCHEME, Entry, Result, Trial
+from beaver_ftc.studies.compare.trial import LAW, ORACLE, SCHEME, STATISTICAL, Entry, Result, Trial
 from beaver_ftc.studies.engine.statistics import (
     CONFIDENCE,
     duel,
@@ -28,8 +28,8 @@ Results = Sequence[Result]  # of one entry, in the order of the flights
 
 def line_of(entry: Entry, results: Results, oracle: Results, ours: Results = ()) -> Document:
     """The line of one entry over one set. oracle: results of the oracle in the same flights, in the same
-    order. ours: the same of our entry, if it flew. Flights that failed with an error are only in `failed` and
-    `against_ours`. ratio: tracking error over that of the oracle, where the oracle has one.
+    order. ours: the same of our entry, if it flew. Flights that failed with an error are only in `failed`.
+    ratio: tracking error over that of the oracle, where the oracle has one.
 
     The delay of an event that never comes is infinite. None: there was nothing to count.
     """
@@ -92,13 +92,12 @@ def _diagnosis(faulted: Results) -> Document:
 def _duel(entry: Entry, mine: Results, ours: Results) -> Document:
     """In how many flights with a fault an entry is worse or better than ours, and the probability p of a
     result at least as uneven between equals. Schemes are compared by whether the fault is detected, laws by
-    the tracking error. In a flight that failed with an error, nothing is detected and the error is
-    infinite."""
+    the tracking error. A flight that failed with an error on either side is left out."""
 
     def badness(result: Result) -> float:
         return result.rms_deg_s if entry.law != LAW else float(result.delay_s == inf)
 
-    flights = zip(mine, ours, strict=bool(ours))
+    flights = [pair for pair in zip(mine, ours, strict=bool(ours)) if all(r.error is None for r in pair)]
     pairs = [(badness(a), badness(b)) for a, b in flights if a.faulted and b.faulted]
     return dict(zip(("worse", "better", "p"), duel(pairs), strict=True))
 
@@ -209,8 +208,16 @@ def _set_document(trials: Sequence[Trial], entries: Sequence[Entry]) -> Document
     }
 
 
-# Schemes and laws that `who_is_better` does not compare: yardsticks and parts of ours.
-YARDSTICKS = ("none", ORACLE, "oracle-published", "fault-tolerant-published")
+# Schemes and laws that are no rivals: yardsticks, and variants and parts of ours.
+NO_RIVALS = ("none", STATISTICAL, ORACLE, "oracle-published", "fault-tolerant-published")
+
+
+def competitors(lines: Sequence[Document]) -> tuple[dict[str, Document], dict[str, Document]]:
+    """The lines of our scheme and its rivals with our law, and of our law and its rivals with our scheme, by
+    name."""
+    schemes = {row["scheme"]: row for row in lines if row["law"] == LAW and row["scheme"] not in NO_RIVALS}
+    laws = {row["law"]: row for row in lines if row["scheme"] == SCHEME and row["law"] not in NO_RIVALS}
+    return schemes, laws
 
 
 def who_is_better(lines: Sequence[Document]) -> Document:
@@ -218,8 +225,7 @@ def who_is_better(lines: Sequence[Document]) -> Document:
     significance. Empty if no flight has a fault."""
     if not any(row["faults"] for row in lines):
         return {}
-    schemes = {row["scheme"]: row for row in lines if row["law"] == LAW and row["scheme"] not in YARDSTICKS}
-    laws = {row["law"]: row for row in lines if row["scheme"] == SCHEME and row["law"] not in YARDSTICKS}
+    schemes, laws = competitors(lines)
     return {
         "schemes": leader(schemes, SCHEME, "detection_rate", "Faults detected", percent, more_is_better=True),
         "laws": leader(
@@ -236,60 +242,56 @@ def leader(
     """One sentence that compares the best rival with ours, each number with its interval. If their numbers
     are equal, it names all rivals that equal ours.
 
-    rows: lines by name, each with the duel `against_ours`. ours: our name; a name that begins with it is no
-    rival. key: of the number; the keys `<key>_low` and `<key>_high` are its interval. title: its name. cell:
-    its format.
+    rows: our line and those of the rivals by name, each with the duel `against_ours`. ours: our name. key: of
+    the number; the keys `<key>_low` and `<key>_high` are its interval. title: its name. cell: its format.
     """
     sign = -1.0 if more_is_better else 1.0
     badness = {name: inf if row.get(key) is None else sign * row[key] for name, row in rows.items()}
-
-    def text_of(name: str) -> str:
-        """The name, its number and the interval of this number."""
-        value, low, high = (
-            missing if rows[name].get(key + end) is None else cell(rows[name][key + end])
-            for end, missing in (("", "none"), ("_low", "no limit"), ("_high", "no limit"))
-        )
-        return f"{name} {value} ({low} to {high})"
-
-    rivals = [name for name in rows if not name.startswith(ours)]
+    texts = {name: f"{name} {_with_interval(row, key, cell)}" for name, row in rows.items()}
+    rivals = [name for name in rows if name != ours]
     if not rivals:
-        return f"{title}: {text_of(ours)}."
+        return f"{title}: {texts[ours]}."
     best = min(rivals, key=badness.__getitem__)
     if badness[best] == badness[ours]:
         equals = [name for name in rivals if badness[name] == badness[ours]]
-        return f"{title}: {ours} and {', '.join(equals)} are equally good: {text_of(ours)}."
+        return f"{title}: {ours} and {', '.join(equals)} are equally good: {texts[ours]}."
     duel = rows[best]["against_ours"]
     wins = {best: duel["better"], ours: duel["worse"]}
     first, second = sorted(wins, key=badness.__getitem__)
     doubt = "" if duel["p"] < SIGNIFICANT else ", so this may be chance"
     return (
-        f"{title}: {text_of(first)} is better than {text_of(second)}; wins: {wins[first]} against "
+        f"{title}: {texts[first]} is better than {texts[second]}; wins: {wins[first]} against "
         f"{wins[second]}, p = {duel['p']:.2g}{doubt}."
     )
 
 
-def better_than_ours(lines: Sequence[Document], free: Document) -> list[str]:
-    """One sentence for each number in which another scheme or law is better than ours, also one of YARDSTICKS
-    but not the scheme `none` and the law `oracle`.
+def _with_interval(row: Document, key: str, cell: Callable[[float], str]) -> str:
+    """A number of a line and its interval."""
+    value, low, high = (
+        missing if row.get(key + end) is None else cell(row[key + end])
+        for end, missing in (("", "none"), ("_low", "no limit"), ("_high", "no limit"))
+    )
+    return f"{value} ({low} to {high})"
 
-    free: by scheme, the point at its most sensitive level without a false alarm.
-    """
-    ours = next(row for row in lines if (row["scheme"], row["law"]) == (SCHEME, LAW))
-    schemes = [row for row in lines if row["law"] == LAW and row["scheme"] not in (SCHEME, "none")]
-    laws = [row for row in lines if row["scheme"] == SCHEME and row["law"] not in (LAW, ORACLE)]
-    sentences = [s for row in schemes for s in _better(row, ours, COMPARED | TRACKING, row["scheme"])]
+
+def better_than_ours(lines: Sequence[Document], free: Document) -> list[str]:
+    """One sentence for each number in which a rival is better than ours. free: by scheme, the point at its
+    most sensitive level without a false alarm."""
+    schemes, laws = competitors(lines)
+    ours = schemes[SCHEME]
+    sentences = [s for name, row in schemes.items() for s in _better(row, ours, COMPARED | TRACKING, name)]
     sentences += [
         f"with no false alarm, {sentence}"
         for scheme, point in free.items()
-        if scheme != SCHEME and SCHEME in free
+        if scheme in schemes and SCHEME in free
         for sentence in _better(point, free[SCHEME], MATCHED, scheme)
     ]
-    return sentences + [s for row in laws for s in _better(row, ours, TRACKING | EFFORT, row["law"])]
+    return sentences + [s for name, row in laws.items() for s in _better(row, ours, TRACKING | EFFORT, name)]
 
 
 def _better(row: Document, ours: Document, compared: Mapping[str, str], name: str) -> Iterator[str]:
     """The sentences of one rival. None is the worst value of each number, an infinite delay or an unknown
-    rate, and printed as `never`."""
+    rate, and printed as `never`. Our own row is never better than itself."""
     for key, name_of_number in compared.items():
         value = row.get(key)
         our_value = ours.get(key)

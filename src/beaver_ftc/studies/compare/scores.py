@@ -31,7 +31,8 @@ def line_of(entry: Entry, results: Results, oracle: Results, ours: Results = ())
     order. ours: the same of our entry, if it flew. Flights that failed with an error are only in `failed`.
     ratio: tracking error over that of the oracle, where the oracle has one.
 
-    The delay of an event that never comes is infinite. None: there was nothing to count.
+    The delay of an event that never comes is infinite, and so is a quantile of nothing. None: a rate in no
+    flight.
     """
     pairs = [(mine, best) for mine, best in zip(results, oracle, strict=True) if mine.error is None]
     completed = [mine for mine, _ in pairs]
@@ -51,8 +52,8 @@ def line_of(entry: Entry, results: Results, oracle: Results, ours: Results = ())
         "us": middle(r.us for r in completed) if completed else 0.0,
         **_spread("before", [r.before_deg_s for r in completed]),
         **_spread("after", [r.after_deg_s for r in faulted]),
-        **_spread("travel", [r.travel_deg_s for r in completed], ("median",)),
-        **_spread("energy", [r.energy_deg2_s2 for r in completed], ("median",)),
+        "travel_median": share_within([r.travel_deg_s for r in completed], 0.5),
+        "energy_median": share_within([r.energy_deg2_s2 for r in completed], 0.5),
         "against_ours": _duel(entry, results, ours),
     }
 
@@ -102,10 +103,9 @@ def _duel(entry: Entry, mine: Results, ours: Results) -> Document:
     return dict(zip(("worse", "better", "p"), duel(pairs), strict=True))
 
 
-def _spread(name: str, values: Sequence[float], parts: Sequence[str] = ("median", "90")) -> Document:
-    """Median and 90 % quantile of values, or one of them."""
-    shares = {"median": 0.5, "90": 0.9}
-    return {f"{name}_{part}": share_within(values, shares[part]) if values else None for part in parts}
+def _spread(name: str, values: Sequence[float]) -> Document:
+    """Median and 90 % quantile of values."""
+    return {f"{name}_median": share_within(values, 0.5), f"{name}_90": share_within(values, 0.9)}
 
 
 def _interval(name: str, values: Sequence[float], unit: str = "") -> Document:

@@ -38,7 +38,7 @@ UNEXPLAINED_UP_TO_RAD_S = 15.0  # frequency of the faster of the published sinus
 
 ESTIMATORS = "adaptive-estimators"
 STATISTICAL, BOTH = "statistical", "both"
-# Our schemes, whose statistic comes with a flight of their own, and keys of `fdi` that select each of them.
+# Our schemes, whose statistic comes with a flight of their own, and keys of `fdi` that select each.
 BUILT_IN: dict[str, Document] = {
     ESTIMATORS: {},
     STATISTICAL: {"statistical": {}, "authority": "statistical"},

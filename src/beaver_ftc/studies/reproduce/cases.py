@@ -209,20 +209,22 @@ def fly_case(case: Changed, changes: Changes | None = None) -> Flown:
 def keys_of(case: Changed, changes: Changes) -> Document:
     """The keys of the scenario of a case in a setting. Cases with the same keys are the same flight.
 
-    A setting that changes the begin of the fault also changes the duration, so that AFTER_S are flown after
+    A setting may change the size of the published loss, and the begin of the fault. AFTER_S are flown after
     it.
     """
-    merged = _without_unused({**case.changes, **changes})
-    size = merged.pop(SIZE, PUBLISHED_LOSS)
-    at_s = merged.pop(AT, FAULT_AT_S)
-    faults = [fault | _struck(fault, size, at_s) for fault in merged.get("faults", [])]
-    later = {"duration_s": AFTER_S + at_s} if at_s != FAULT_AT_S else {}
-    return merged | ({"faults": faults} if "faults" in merged else {}) | later
+    keys = _without_unused({**case.changes, **changes})
+    size = keys.pop(SIZE, PUBLISHED_LOSS)
+    at_s = keys.pop(AT, FAULT_AT_S)
+    keys["duration_s"] = AFTER_S + at_s
+    if "faults" in keys:
+        keys["faults"] = [_struck(fault, size, at_s) for fault in keys["faults"]]
+    return keys
 
 
 def _struck(fault: Changes, size: float, at_s: float) -> Document:
-    """The changed keys of a fault: its begin, and its size if it is the published loss."""
-    return {"at_s": at_s} | ({"magnitude": size} if fault.get("magnitude") == PUBLISHED_LOSS else {})
+    """A fault that begins at `at_s`; the published loss has this size."""
+    changed = {"magnitude": size} if fault.get("magnitude") == PUBLISHED_LOSS else {}
+    return {**fault, **changed, "at_s": at_s}
 
 
 def _fly(name: str, keys: Changes) -> Flown:

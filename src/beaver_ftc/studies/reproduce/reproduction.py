@@ -155,9 +155,14 @@ def _claims(pairs_of: BySetting) -> Rows:
         claim: _judged(claim, {name: pairs[i] for name, pairs in pairs_of.items()})
         for i, claim in enumerate(MEASURED)
     }
-    return [
-        {"where": c.where, "statement": c.statement, **(judged.get(c) or _unjudged(c.reason))} for c in CLAIMS
-    ]
+    rows = []
+    for claim in CLAIMS:
+        outcome = judged.get(claim) or {
+            "verdict": CANNOT_BE_JUDGED, "reason": claim.reason, "because": "", "number": None,
+            "construction": False,
+        }  # fmt: skip
+        rows.append({"where": claim.where, "statement": claim.statement, **outcome})
+    return rows
 
 
 def _judged(claim: Claim, by_setting: Mapping[str, tuple[float, float]]) -> Document:
@@ -191,13 +196,6 @@ def _judged(claim: Claim, by_setting: Mapping[str, tuple[float, float]]) -> Docu
         "because": claim.because if verdict == NOT_BORNE_OUT else "",
         "reason": "",
     }
-
-
-def _unjudged(reason: str) -> Document:
-    """The row of a claim without a measure."""
-    return {
-        "verdict": CANNOT_BE_JUDGED, "reason": reason, "because": "", "number": None, "construction": False,
-    }  # fmt: skip
 
 
 def _counted_apart(claims: Sequence[Document]) -> Document:

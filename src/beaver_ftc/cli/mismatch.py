@@ -83,7 +83,7 @@ def command(
 def _variants(scenario: "Scenario", text: str) -> list["Scenario"]:
     """The scenario with each of the design models that the option --variant lists; without it, the scenario
     alone."""
-    from beaver_ftc.studies.mismatch.study import variant_of
+    from beaver_ftc.studies.mismatch.variants import variant_of
 
     variants = [variant_of(scenario, name.strip()) for name in text.split(",")] if text else [scenario]
     names = [flight.name for flight in variants]

@@ -12,7 +12,7 @@ from beaver_ftc.results.log import StoredLog
 from beaver_ftc.studies.engine.study import run_into
 from beaver_ftc.studies.mismatch import study
 from beaver_ftc.studies.mismatch.sources import SOURCES
-from beaver_ftc.studies.mismatch.study import VARIANTS, variant_of
+from beaver_ftc.studies.mismatch.variants import VARIANTS, variant_of
 from flying import loss, scenario
 
 SHORT = """

@@ -11,7 +11,8 @@ from beaver_ftc.plant.true_aircraft import configure
 from beaver_ftc.scenario.builtin import builtin_names
 from beaver_ftc.scenario.schema import load_scenario
 from beaver_ftc.studies.mismatch.sources import SOURCES, name_of
-from beaver_ftc.studies.mismatch.study import split_flight, variant_of
+from beaver_ftc.studies.mismatch.split import split_flight
+from beaver_ftc.studies.mismatch.variants import variant_of
 from flying import flown, loss, scenario
 
 PUBLISHED_BOUND = 0.02  # rad/s2

@@ -264,9 +264,8 @@ def fly_block(case: tuple[Block, bool], grid: Grid, schemes: Sequence[str]) -> W
         healthy = scenario_of(block, grid.healthy_flight_s, where=grid.where)
         return _watch(Watched(block), [healthy], schemes)
     at_s = strikes_at_s(block)
-    faults = ([loss(*fault, at_s)] for fault in grid.faults)
     flights = [
-        scenario_of(block, at_s + WATCHED_S, faults_of_flight, grid.where) for faults_of_flight in faults
+        scenario_of(block, at_s + WATCHED_S, [loss(*fault, at_s)], grid.where) for fault in grid.faults
     ]
     return _watch(Watched(block, grid.faults), flights, schemes)
 

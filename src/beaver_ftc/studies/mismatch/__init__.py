@@ -5,6 +5,7 @@ sources    the part of each cause in truth less design, from differences of mode
 split      the sum of the causes, compared with the bound
 bound      the bound that is recommended
 linear     truth and design linearised about the trim
-study      flights, also with wrong designs, and their files
+study      flights and their files
+variants   scenarios with wrong designs
 tables, charts    the results for people
 """

@@ -24,10 +24,9 @@ def recommend(needed: Sequence[np.ndarray], at_least: PerAxis | None = None) -> 
     needed: of each run, the constant part (3,) rad/s2 that would have covered it. Each axis has the largest,
     rounded up to two digits; none is below `at_least`, by default 0.
     """
-    bound_of_axis = dict(at_least or dict.fromkeys(AXES, 0.0))
-    for axis, largest in zip(AXES, np.max(needed, axis=0).tolist(), strict=True):
-        bound_of_axis[axis] = max(bound_of_axis[axis], rounded_up(largest))
-    return bound_of_axis
+    least = at_least or dict.fromkeys(AXES, 0.0)
+    largest = np.max(needed, axis=0).tolist()
+    return {axis: max(least[axis], rounded_up(value)) for axis, value in zip(AXES, largest, strict=True)}
 
 
 def widened(constant_rad_s2: PerAxis) -> PerAxis:

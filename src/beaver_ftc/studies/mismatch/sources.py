@@ -84,7 +84,7 @@ ENGINE_TERMS = tuple(term.name for term in load().moments if "dpt" in dict(term.
 Contributions = dict[str, np.ndarray]
 """Angular accelerations (n, 3) rad/s2 by source, or by part of a source."""
 Parts = Iterator[tuple[Any, np.ndarray]]
-"""(fault, its part of the deflection (n,) rad) of each fault of a surface."""
+"""(fault, its part) of each fault: of a deflection, (n,) rad, or an angular acceleration, (n, 3) rad/s2."""
 
 
 def healthy_positions(scenario: Scenario, commands: np.ndarray) -> np.ndarray:
@@ -193,34 +193,37 @@ class Models:
         }
 
 
-def fault_effects(m: Models, states: States, G: np.ndarray, healthy: np.ndarray) -> Contributions:
-    """The angular acceleration G (n, 3, 4) times its part of the deflection, (n, 3) rad/s2, of each fault of
-    a surface. healthy (n, 4) rad: positions of healthy actuators."""
-    effects: Contributions = {}
+def fault_effects(m: Models, states: States, G: np.ndarray, healthy: np.ndarray) -> Parts:
+    """G (n, 3, 4) times its part of the deflection, of each fault of a surface. healthy (n, 4) rad: positions
+    of healthy actuators."""
     for s, surface in enumerate(SURFACES):
         faults = [fault for fault in m.scenario.faults if getattr(fault, "actuator", "") == surface]
         position = states.position[:, s]
         parts = *_lost(faults, states, position), *_displaced(faults, states.t_s, position - healthy[:, s])
         for fault, by_rad in parts:
-            name = name_of(fault)
-            effects[name] = effects.get(name, 0.0) + G[:, :, s] * by_rad[:, None]
-    return effects
+            yield fault, G[:, :, s] * by_rad[:, None]
 
 
-def unanticipated_effects(m: Models, states: States) -> Contributions:
-    """The angular acceleration (n, 3) rad/s2 of each unanticipated fault, which is a pitching moment."""
-    effects: Contributions = {}
+def unanticipated_effects(m: Models, states: States) -> Parts:
+    """The angular acceleration of each unanticipated fault, which is a pitching moment."""
     for fault in m.scenario.faults:
         if fault.type == UNANTICIPATED:
             extra: Any = fault
             pitch = unanticipated_at(m.design, states.y, extra.Cm_alpha3 * share(fault, states.t_s))
-            name = name_of(fault)
-            effects[name] = effects.get(name, 0.0) + np.outer(pitch, (0.0, 1.0, 0.0))
-    return effects
+            yield fault, np.outer(pitch, (0.0, 1.0, 0.0))
+
+
+def named(parts: Parts) -> Contributions:
+    """The parts by name of their faults. Faults of the same name share a part."""
+    by_name: Contributions = {}
+    for fault, part in parts:
+        name = name_of(fault)
+        by_name[name] = by_name.get(name, 0.0) + part
+    return by_name
 
 
 def name_of(fault: Any) -> str:
-    """The name of a fault: surface, type and time. Faults of the same name are one part of the source."""
+    """The name of a fault: surface, type and time."""
     place = "" if place_of(fault) == fault.type else f"{place_of(fault)} "
     return f"{place}{fault.type.replace('_', ' ')} at {fault.at_s:g} s"
 
@@ -305,8 +308,8 @@ def instantaneous(m: Models, s: States) -> tuple[Contributions, dict[str, Contri
     coefficient."""
     healthy = healthy_positions(m.scenario, s.u)
     _, G = responses_at(m.design, s.x, s.y)
-    moments = unanticipated_effects(m, s)
-    faults = fault_effects(m, s, G, healthy) | moments
+    moments = named(unanticipated_effects(m, s))
+    faults = named(fault_effects(m, s, G, healthy)) | moments
     nothing = np.zeros_like(s.x)
     measured = acceleration_at(m.design, s.x_measured, s.y_measured, s.u)
     tied, untied, whole, turning, truth = (

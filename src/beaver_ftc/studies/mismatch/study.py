@@ -5,18 +5,13 @@ share                  RMS of a source over the RMS of the total; sources may ca
                        not add up to 1
 bound_share            largest share of the bound eta_bar that a source has used in any frame
 map                    the scenario without faults, flown at each airspeed and altitude
-variant                a scenario with another `design_model`: a name of VARIANTS, or key=value of
-                       `design_model`, or several of these joined by +, such as
-                       `linearised+coefficients.Cm_alpha=0.9`
 """
 
-import re
 from collections.abc import Iterable, Iterator
 from functools import partial
 from pathlib import Path
 
 import numpy as np
-import yaml
 
 from beaver_ftc.aircraft import AXES, load
 from beaver_ftc.documents.errors import BadInput
@@ -50,18 +45,7 @@ COMPARISON = "mismatch-comparison"
 MAP = "mismatch-map"
 AIRSPEEDS_MPS = (30.0, 35.0, 40.0, 45.0, 50.0, 55.0)  # the validated envelope
 ALTITUDES_M = (0.0, 1000.0, 2000.0, 3000.0, 4000.0)
-# Keys of an axis in an entry of the comparison, and of the map; the first two of the map are those of the
-# bound. `dominant` of an axis: the source with the largest peak.
-_OF_BOUND = ("worst_ratio", "smallest_constant_rad_s2", "exceeded_s")
-_OF_MAP = ("worst_ratio", "smallest_constant_rad_s2", "dominant", "false_alarm")
-DECLARED = "declared"
-VARIANTS: dict[str, Document] = {
-    DECLARED: {},
-    "engine-neglected": {"engine_terms": False},
-    "linearised": {"linearised": True},
-    "frozen-alpha": {"frozen_alpha": True},
-    "heavy": {"mass": 1.1},
-}
+_OF_BOUND = ("worst_ratio", "smallest_constant_rad_s2")  # in the entries of the comparison and of the map
 
 
 def run_mismatch(
@@ -163,12 +147,16 @@ def _as_files(document: Document, table: Iterable[Document]) -> Files:
 
 
 def entry(document: Document) -> Document:
-    """The entry of one flight in the comparison. `dominant` is by share of the bound, `AXIS_dominant` by the
-    peak."""
+    """The entry of one flight in the comparison. `dominant`: the source with the largest share of the bound.
+    `AXIS_dominant`: the source with the largest peak on the axis."""
     recommended = document["guarantee"]["recommended"]
     return {
         "scenario": document["scenario"],
-        **{f"{axis}_{key}": document["bound"][axis][key] for key in _OF_BOUND for axis in AXES},
+        **{
+            f"{axis}_{key}": document["bound"][axis][key]
+            for key in (*_OF_BOUND, "exceeded_s")
+            for axis in AXES
+        },
         **{f"{axis}_dominant": charts.largest_sources(document, axis)[0] for axis in AXES},
         "dominant": document["dominant"]["source"] if document["dominant"] else None,
         "false_alarm": document["false_alarm"],
@@ -211,48 +199,16 @@ def _cell(scenario: Scenario, condition: tuple[float, float]) -> list[Document]:
     try:
         flight_split, flight = split_flight(scenario.model_copy(update=changes))
     except BadInput:
-        return [{**place, "axis": axis, **dict.fromkeys(_OF_MAP)} for axis in AXES]
+        nothing = dict.fromkeys((*_OF_BOUND, "dominant", "false_alarm"))
+        return [{**place, "axis": axis, **nothing} for axis in AXES]
     result = document(scenario, flight_split, flight)
     return [
         {
             **place,
             "axis": axis,
-            **{key: result["bound"][axis][key] for key in _OF_MAP[:2]},
+            **{key: result["bound"][axis][key] for key in _OF_BOUND},
             "dominant": charts.largest_sources(result, axis)[0],
             "false_alarm": result["false_alarm"],
         }
         for axis in AXES
     ]
-
-
-def variant_of(scenario: Scenario, text: str) -> Scenario:
-    """The scenario with one variant's design model, named after both. Raises BadInput for an unknown one."""
-    pieces = [_changes(piece.strip()) for piece in text.split("+")]
-    changes = {f"design_model.{key}": value for piece in pieces for key, value in piece.items()}
-    if text != DECLARED:
-        ending = re.sub(r"[^\w-]", "-", text)
-        changes["name"] = f"{scenario.name}-{ending}"[:100]
-    changes["expect"] = {}  # expectations hold for the declared design model alone
-    try:
-        return scenario.with_(changes)
-    except BadInput as error:
-        raise BadInput("\n".join(f"--variant {text}: {line}" for line in str(error).splitlines())) from None
-
-
-def _changes(piece: str) -> Document:
-    """Keys of `design_model` and values, of a name of VARIANTS or of a text `key=value`."""
-    if piece in VARIANTS:
-        return VARIANTS[piece]
-    key, equals, text = piece.partition("=")
-    if not equals:
-        raise BadInput(
-            f"--variant {piece}: no such variant, "
-            f"allowed: {', '.join(VARIANTS)}, or key=value of design_model"
-        )
-    try:
-        value = yaml.safe_load(text)
-    except yaml.YAMLError:
-        value = None
-    if not isinstance(value, bool | int | float):
-        raise BadInput(f"--variant {piece}: {text!r} is no value, allowed: a number, true or false")
-    return {key: value if isinstance(value, bool) else float(value)}

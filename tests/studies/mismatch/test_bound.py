@@ -16,6 +16,7 @@ from beaver_ftc.studies.mismatch.bound import (
 )
 from beaver_ftc.studies.mismatch.sources import SOURCES
 from beaver_ftc.studies.mismatch.split import Split
+from beaver_ftc.studies.mismatch.tables import BOUNDS
 from flying import loss, scenario
 
 CONSTANT = np.array([0.02, 0.02, 0.02])
@@ -70,6 +71,14 @@ def test_nothing_is_no_share_of_a_bound_of_nothing():
 def test_a_stay_names_its_source():
     found = flight_of([0.0], [0.05], source="engine").bound(0)
     assert found["exceedances"][0]["source"] == "engine"
+
+
+def test_a_bound_of_zero_is_exceeded_most():
+    reason_of = BOUNDS[-1][-1]
+    assert (
+        reason_of([{"peak_ratio": 2.0, "source": "engine"}, {"peak_ratio": None, "source": "sensors"}])
+        == "sensors"
+    )
 
 
 @given(st.floats(1e-9, 1e3))

@@ -8,6 +8,7 @@ from beaver_ftc.documents.files import read_json
 from beaver_ftc.results.expectations import value_text, without_underscores
 from beaver_ftc.results.model import Document
 from beaver_ftc.results.verdict import printed
+from beaver_ftc.studies.engine.statistics import or_never
 from beaver_ftc.studies.present import page
 from beaver_ftc.studies.present.tables import number, plain, seconds, tabulated
 
@@ -79,12 +80,12 @@ def _case(case: Document) -> str:
 
 
 def _reason(exceedances: list[Document]) -> str:
-    """The source of the largest of the listed exceedances (MAX_EXCEEDANCES of split.py)."""
+    """The source of the largest of the listed exceedances (MAX_EXCEEDANCES of split.py). A ratio that is None
+    is infinite: the bound is 0."""
     if not exceedances:
         return "-"
-    return without_underscores(
-        max(exceedances, key=lambda exceedance: exceedance["peak_ratio"] or 0.0)["source"]
-    )
+    largest = max(exceedances, key=lambda exceedance: or_never(exceedance["peak_ratio"]))
+    return without_underscores(largest["source"])
 
 
 def _needed(axis: str, entry: Document) -> str:

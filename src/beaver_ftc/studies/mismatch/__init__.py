@@ -1,6 +1,7 @@
 """Truth against design: the errors of the design model, their size, and their cost for the diagnosis.
 
-states     the columns of a log as arrays
+states     the log of a flight, and what it lacks, as arrays
+actuators  positions that healthy actuators would have
 sources    the part of each cause in truth less design, from differences of models
 split      the sum of the causes, compared with the bound
 bound      the bound that is recommended

@@ -17,14 +17,6 @@ changes one thing and keeps the changes of the steps before it, so that their su
       earth_rotation     on a turning Earth
       integration        as JSBSim's integration moves the rates
 
-Healthy actuators follow the logged commands, as the surfaces would without a fault. With the position a
-(rad), in each JSBSim frame of length dt (s), within the stops,
-
-    a <- a + min(max(w e, -rate dt), rate dt),  w = 1 - exp(-bandwidth dt),  e = demand - a less the dead band
-
-An actuator without lag, rate limit and dead band has a = demand. The command of a row was in force in all
-JSBSim frames that led to it. At the start, the actuator rests at its command.
-
 The effects of faults are computed with G of the design, as in the theory:
 
     loss of effectiveness   the lost share of the position; of several losses, each takes its share of the
@@ -46,15 +38,14 @@ the body axes, adds the moment F x c (N m).
 
 from collections.abc import Iterator
 from dataclasses import replace
-from math import exp, inf, radians
+from math import radians
 from typing import Any
 
 import numpy as np
 
 from beaver_ftc.aircraft import AXES, load
 from beaver_ftc.aircraft.aircraft import EARTH_RADIUS_M, EARTH_RATE_RAD_S
-from beaver_ftc.compiled import kernel
-from beaver_ftc.design.fdc import SURFACES, TRAVEL
+from beaver_ftc.design.fdc import SURFACES
 from beaver_ftc.design.model import (
     InertiaCoefficients,
     acceleration_at,
@@ -73,6 +64,7 @@ from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.faults import UNANTICIPATED, place_of
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.signals import grown_share, is_before, is_in_force
+from beaver_ftc.studies.mismatch.actuators import healthy_positions
 from beaver_ftc.studies.mismatch.states import States
 
 SOURCES = (  # in the order of the steps
@@ -85,49 +77,6 @@ Contributions = dict[str, np.ndarray]
 """Angular accelerations (n, 3) rad/s2 by source, or by part of a source."""
 Parts = Iterator[tuple[Any, np.ndarray]]
 """(fault, its part) of each fault: of a deflection, (n,) rad, or an angular acceleration, (n, 3) rad/s2."""
-
-
-def healthy_positions(scenario: Scenario, commands: np.ndarray) -> np.ndarray:
-    """Positions (n, 4) rad of healthy actuators at the rows of a log with these commands (n, 4) rad."""
-    dt = 1.0 / (scenario.rate_hz * scenario.substeps)
-    share, reach, band, low, high = np.array([_servo(scenario, surface, dt) for surface in SURFACES]).T
-    positions = np.empty_like(commands)
-    _follow(commands, share, reach, band, low, high, scenario.substeps, positions)
-    return positions
-
-
-def _servo(scenario: Scenario, surface: str, dt: float) -> tuple[float, ...]:
-    """The servo of a surface in a JSBSim frame of dt s: share w, then reach = rate dt, dead band, lower and
-    upper stop, rad."""
-    servo = getattr(scenario.actuators, surface)
-    errors = getattr(scenario.uncertainty.actuators, surface)
-    bandwidth = servo.bandwidth_rad_s * errors.bandwidth
-    rate = servo.rate_limit_deg_s * errors.rate_limit
-    stops = TRAVEL[surface].min_rad, TRAVEL[surface].max_rad
-    if servo.travel_deg is not None:
-        stops = radians(servo.travel_deg[0]), radians(servo.travel_deg[1])
-    share = 1.0 - exp(-bandwidth * dt) if bandwidth else 1.0
-    reach = radians(rate) * dt if rate else inf
-    return share, reach, radians(errors.dead_band_deg), *stops
-
-
-@kernel
-def _follow(commands, share, reach, band, low, high, runs, positions):
-    """Fill positions (n, 4) rad with a, by the recursion of the module. runs: JSBSim frames in a row.
-
-    commands (n, 4) rad. For each surface (4,): share w; reach = rate dt, dead band to each side, and stops
-    low and high, rad.
-    """
-    at = np.minimum(np.maximum(commands[0], low), high)
-    ideal = (share == 1.0) & (reach == np.inf) & (band == 0.0)
-    for k in range(commands.shape[0]):
-        demand = np.minimum(np.maximum(commands[k], low), high)
-        for _ in range(runs):
-            e = demand - at
-            e -= np.minimum(np.maximum(e, -band), band)
-            way = np.minimum(np.maximum(share * e, -reach), reach)
-            at = np.where(ideal, demand, np.minimum(np.maximum(at + way, low), high))
-        positions[k] = at
 
 
 def earth_in_body(attitude: np.ndarray, latitude: np.ndarray) -> np.ndarray:

@@ -80,8 +80,8 @@ def verdict_words(claim: Document) -> str:
 
 def remark(claim: Document) -> str:
     """Whether a statement is true by construction, and what `_remark` says."""
-    construction = ["true by the construction of the code"] if claim["construction"] else []
-    return "; ".join([*construction, *filter(None, [_remark(claim)])])
+    construction = "true by the construction of the code" if claim["construction"] else ""
+    return "; ".join(filter(None, (construction, _remark(claim))))
 
 
 def _remark(claim: Document) -> str:
@@ -100,14 +100,11 @@ def exceptions(document: Document) -> list[str]:
     """A sentence for each statement and setting in which, unlike in the published one, it does not hold, or
     also holds without its mechanism."""
     return [
-        sentence
+        f"{row['variant']}: {sentence}"
         for row in document["sensitivity"]
         for sentence in (
-            *(f"{row['variant']}: {_sentence(missed)}" for missed in row["missed"]),
-            *(
-                f"{row['variant']}: {_sentence(statement)}, without {statement['without']}"
-                for statement in row["also_without"]
-            ),
+            *map(_sentence, row["missed"]),
+            *(f"{_sentence(claim)}, without {claim['without']}" for claim in row["also_without"]),
         )
     ]
 

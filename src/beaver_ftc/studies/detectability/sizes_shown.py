@@ -49,10 +49,13 @@ def _sentences(document: Document) -> Iterator[str]:
     help."""
     yield from _sizes(document)
     yield from _doubts(document)
+    better = [row for row in document["compared"] if _is_better(row, document)]
+    references = [row for row in better if "reference" in row["variant"]]  # as sizes.py names these alone
+    left_out = [row for row in better if row not in references]
     no_difference = "makes a difference outside of the intervals"
-    limit = _effect(_best(document, references=False), f"nothing that was left out alone {no_difference}")
+    limit = _effect(left_out, f"nothing that was left out alone {no_difference}")
     yield f"What limits it most: {limit}."
-    helpful = _effect(_best(document, references=True), f"none of those that were tried {no_difference}")
+    helpful = _effect(references, f"none of those that were tried {no_difference}")
     yield f"Which reference would help: {helpful}."
 
 
@@ -108,23 +111,12 @@ def _is_better(variant: Document, document: Document) -> bool:
     return size["high"] is not None and base["low"] is not None and bool(size["high"] < base["low"])
 
 
-def _best(document: Document, references: bool) -> Document | None:
-    """The variant with the smallest size, among those that are better. references: whether to choose from the
-    variants with another reference, whose names contain this word, or from the others."""
-    better = [
-        row
-        for row in document["compared"]
-        if ("reference" in row["variant"]) is references and _is_better(row, document)
-    ]
-    return min(
-        better, key=lambda row: (row["found"]["size"] or inf, -row["total_loss"]["value"]), default=None
-    )
-
-
-def _effect(row: Document | None, none: str) -> str:
-    """The name of a variant, and the size found in its flights; `none` if there is no such variant."""
-    if row is None:
+def _effect(variants: Sequence[Document], none: str) -> str:
+    """The name of the variant with the smallest size, and this size; `none` without variants. Where no loss
+    is found often enough, the variant that finds most total losses counts as the smallest."""
+    if not variants:
         return none
+    row = min(variants, key=lambda row: (row["found"]["size"] or inf, -row["total_loss"]["value"]))
     size = row["found"]
     total = row["total_loss"]
     if size["size"] is None:

@@ -21,8 +21,8 @@ from math import degrees, inf
 
 import numpy as np
 
+from beaver_ftc.diagnosis import TYPE_NAMES, UNANTICIPATED, DiagnosisReadout
 from beaver_ftc.diagnosis import TYPE_ROWS as TYPES
-from beaver_ftc.diagnosis import UNANTICIPATED, DiagnosisReadout, type_index_of
 from beaver_ftc.results import Document
 from beaver_ftc.scenario import Scenario
 from beaver_ftc_assurance.certificates.history import History, declared_errors_of
@@ -39,7 +39,7 @@ RELATIONS = {
     for kind, row in enumerate(TYPES)
     if row.has_constant_parameter and row.deflection_relation
 }
-LOSS = type_index_of("loss_of_effectiveness")  # the only type of the fault class `losses`
+LOSS = TYPE_NAMES.index("loss_of_effectiveness")  # the only type of the fault class `losses`
 
 
 @dataclass(frozen=True)

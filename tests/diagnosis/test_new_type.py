@@ -192,8 +192,8 @@ PROMISE = """
 import sys, json
 sys.path.insert(0, {folder!r})
 from design_plant import UNCERTAINTIES, DesignPlant
-from beaver_ftc.diagnosis.types.registry import type_index_of
-KIND = type_index_of("overdrive", has_constant_parameter=False)
+from beaver_ftc.diagnosis.types.registry import TYPE_NAMES
+KIND = TYPE_NAMES.index("overdrive")
 
 def worn(sign):
     past = dict(travel=0.0, last=0.0)

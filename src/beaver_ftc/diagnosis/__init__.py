@@ -28,7 +28,7 @@ if TYPE_CHECKING:  # what the folder publishes: public.py
         StatisticalHypothesis,
     )
     from beaver_ftc.diagnosis.state import LOSS, UNANTICIPATED, scheme_number
-    from beaver_ftc.diagnosis.types.registry import DESCRIPTIONS_IN_TYPE_ORDER, TYPE_NAMES, type_index_of
+    from beaver_ftc.diagnosis.types.registry import DESCRIPTIONS_IN_TYPE_ORDER, TYPE_NAMES
     from beaver_ftc.diagnosis.types.registry import TYPES as TYPE_ROWS
 else:
     __getattr__, __dir__ = lazily(__name__)

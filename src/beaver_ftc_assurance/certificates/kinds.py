@@ -12,8 +12,8 @@ from math import inf
 import numpy as np
 
 from beaver_ftc.diagnosis import DESCRIPTIONS_IN_TYPE_ORDER as WORDS
+from beaver_ftc.diagnosis import TYPE_NAMES
 from beaver_ftc.diagnosis import TYPE_ROWS as TYPES
-from beaver_ftc.diagnosis import type_index_of
 from beaver_ftc_assurance.certificates.check_certificate import COURSES, RELATIONS, Relation
 from beaver_ftc_assurance.certificates.history import History
 from beaver_ftc_assurance.certificates.inequality import (
@@ -34,7 +34,7 @@ TYPE_TOO_LATE = (
 )
 UNKNOWN_TYPE = "no certificate is known for this type"
 RETURNING_SURFACE = "its actuator may be bringing the surface back"
-STUCK = type_index_of("stuck")
+STUCK = TYPE_NAMES.index("stuck")
 
 
 def excluded_types(tape: Tape) -> Iterator[tuple[int, int, int]]:

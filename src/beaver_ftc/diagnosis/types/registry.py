@@ -75,12 +75,6 @@ ERROR_TYPES = np.array(
 END_TYPE = np.array([TYPE_NAMES.index(row.end_type) if row.end_type else -1 for row in TYPES])
 
 
-def type_index_of(name: str, *, has_constant_parameter: bool = True, stop_direction: int = 0) -> int:
-    """The number of a type, by its name in the table; stop_direction: of the stop to which it runs."""
-    sought = (name, has_constant_parameter, stop_direction)
-    return [(row.name, row.has_constant_parameter, row.stop_direction) for row in TYPES].index(sought)
-
-
 def _by_type(name: str, default: Any) -> Kernel:
     """A kernel (h, *arguments) that returns what this part of type h returns for these arguments; `default`
     for a type without it."""

@@ -47,11 +47,11 @@ from beaver_ftc.control.profile import (
     SPEED,
     advance_commands,
     clamp,
-    wrap_to_half_turn,
 )
 from beaver_ftc.control.thrust import gained, look_up, power_for, thrust_per_inhg
 from beaver_ftc.design.table import AIRSPEED, ALPHA, BETA
 from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
+from beaver_ftc.plant.instruments import wrapped
 
 MOST_PATH_RAD = 0.15  # steepest climb or descent to demand
 MOST_SIDESLIP_RAD = 0.14  # largest sideslip to demand, in order to roll by it
@@ -340,7 +340,7 @@ def bank_to_turn(autopilot, share, heading):
     So where nothing acts in yaw, the loop is slower, and integrates its error.
     """
     gain, yaw_loss = autopilot.gain, autopilot.yaw_loss_share
-    error = wrap_to_half_turn(autopilot.command[HEADING] - heading)
+    error = wrapped(autopilot.command[HEADING] - heading)
     loose = 1.0 - yaw_loss * (1.0 - gain.loose)
     missing = autopilot.missing_turn_rate + autopilot.dt * yaw_loss * gain.heading_i * error
     autopilot.missing_turn_rate = yaw_loss * clamp(missing, MOST_DRIFT_RAD_S)

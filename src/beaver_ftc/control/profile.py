@@ -10,6 +10,7 @@ from math import inf, nan, radians
 import numpy as np
 
 from beaver_ftc.compiled import kernel
+from beaver_ftc.plant.instruments import wrapped
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.signals import MEAN_S, TIME_TOLERANCE_S
 
@@ -34,12 +35,6 @@ def clamp(value, limit):
 
 
 @kernel
-def wrap_to_half_turn(angle):
-    """The same direction, as an angle from -pi to pi, rad."""
-    return angle - 2.0 * np.pi * np.floor((angle + np.pi) / (2.0 * np.pi))
-
-
-@kernel
 def begin_leg(autopilot, c, measured, t):
     """Begin the next leg of channel c at t s; measured: the signal, from which the command begins
     with the first leg. A heading goes to the value by the shorter turn. A leg without a value (NaN) keeps the
@@ -53,7 +48,7 @@ def begin_leg(autopilot, c, measured, t):
     autopilot.goal[c] = autopilot.command[c]
     if not np.isnan(value):
         change = value - autopilot.command[c]
-        autopilot.goal[c] += wrap_to_half_turn(change) if c == HEADING else change
+        autopilot.goal[c] += wrapped(change) if c == HEADING else change
         autopilot.changed_at_s[c] = t
     autopilot.max_command_rate[c] = autopilot.leg_max_command_rate[c, j]
 
@@ -90,7 +85,7 @@ def record_deviations(autopilot, altitude_m, airspeed_mps, heading, bank, t):
             continue
         deviation = signals[c] - autopilot.command[c]
         if c == HEADING:
-            deviation = wrap_to_half_turn(deviation)
+            deviation = wrapped(deviation)
         autopilot.mean_deviation[c] += autopilot.dt / MEAN_S * (deviation - autopilot.mean_deviation[c])
         if c == SPEED:
             record_airspeed_deviations(autopilot, airspeed_mps, deviation)

@@ -35,7 +35,7 @@ import numpy as np
 
 from beaver_ftc.aircraft import AXES, MassProperties
 from beaver_ftc.aircraft.aircraft import EARTH_RATE_RAD_S
-from beaver_ftc.aircraft.schema import MAX_BOXES, MAX_LEVELS
+from beaver_ftc.aircraft.schema import MAX_LEVELS
 from beaver_ftc.compiled import fill, kernel, record, sized
 from beaver_ftc.design import LEAST_HEIGHT_M
 from beaver_ftc.design.engine import DPT_0, KW_TO_DPT, density_ratio, power_error_kw
@@ -82,7 +82,7 @@ def errors_dtype(n: int) -> np.dtype:
 
 
 @sized
-def bound_dtype(n: int, boxes: int = MAX_BOXES) -> np.dtype:
+def bound_dtype(n: int, boxes: int) -> np.dtype:
     """Bounds on the uncertainty.
 
     eta_bar, eta_now     bound over the elapsed frame, and at this instant, rad/s2

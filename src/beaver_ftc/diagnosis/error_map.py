@@ -21,7 +21,7 @@ Symbols of the kernels (emap: of `map_dtype`):
 import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
-from beaver_ftc.aircraft.schema import MAX_AGES, MAX_BOXES, MAX_LEVELS
+from beaver_ftc.aircraft.schema import MAX_AGES, MAX_LEVELS
 from beaver_ftc.compiled import fill, kernel, record, sized
 from beaver_ftc.design.table import AIRSPEED, N_Y, QDYN
 
@@ -32,7 +32,7 @@ N_MAP_COORDINATES = 3 + N_Y  # rates, then y with the density of the air in plac
 
 
 @sized
-def map_dtype(n: int, boxes: int = MAX_BOXES) -> np.dtype:
+def map_dtype(n: int, boxes: int) -> np.dtype:
     """The map of the error of an aircraft's model, with n surfaces.
 
     one_free: one surface may be anywhere in its travel; two_free: more than one may. lo, hi: ends of each

@@ -73,7 +73,7 @@ def unmeasured_share(gust, j):
 
 
 @kernel
-def unmeasured_drift(gust, V, i, k, as_rolling=False):
+def unmeasured_drift(gust, V, i, k, as_rolling):
     """Intensity, (rad/s2)2/s, of the drift of accelerations i and k by the unmeasured rotation; V m/s:
     airspeed.
 

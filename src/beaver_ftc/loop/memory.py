@@ -28,7 +28,7 @@ def _new_memory(n_bytes: int) -> np.ndarray:
     return np.frombuffer(bytes_and_gap.data, np.uint8, n_bytes, gap)
 
 
-def taken_empty(shape: tuple[int, ...], dtype: np.dtype | type = np.float64) -> np.ndarray:
+def taken_empty(shape: tuple[int, ...], dtype: np.dtype) -> np.ndarray:
     """The same, every byte of it zero."""
     array = taken(shape, dtype)
     assert array.base is not None

@@ -286,9 +286,9 @@ def landing_of(
     scenario: Scenario,
     frame: np.void,
     columns: tuple[str, ...],
-    verdict: Verdict | None = None,
-    replaced: tuple[dict[str, Any], ...] = (),
-    windows: tuple[dict[str, Any], ...] = (),
+    verdict: Verdict | None,
+    replaced: tuple[dict[str, Any], ...],
+    windows: tuple[dict[str, Any], ...],
 ) -> Landing:
     """Read the flight's outcome off its frame record; `verdict` is a plug-in detector's last one, `replaced`
     what changes in flight have ended, `windows` what was found in each."""

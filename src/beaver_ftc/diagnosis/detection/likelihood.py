@@ -418,7 +418,7 @@ def evaluate_tests(b, t, n, without_eta, mapped):
 
 
 @kernel
-def evaluate_hypotheses(b, decay=0.0, mapped=False):
+def evaluate_hypotheses(b, decay, mapped):
     """Fill the score, the estimate and the bounds on the log-likelihood ratio of each hypothesis.
 
     Score and bounds are the largest over its onsets; the estimate is that of the likeliest onset. decay: if a

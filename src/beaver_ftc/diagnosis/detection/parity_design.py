@@ -75,7 +75,7 @@ class ParityDirection(NamedTuple):
         return self.rows[-1] >= SIDE_FORCE
 
 
-def list_directions(aircraft: Aircraft, with_forces: bool = False) -> Iterator[ParityDirection]:
+def list_directions(aircraft: Aircraft, with_forces: bool) -> Iterator[ParityDirection]:
     """The parity directions of an aircraft:
 
         each axis by itself

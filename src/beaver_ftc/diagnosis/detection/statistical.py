@@ -40,7 +40,6 @@ from beaver_ftc.diagnosis.detection.likelihood import (
     block_dtype,
 )
 from beaver_ftc.diagnosis.detection.parity import (
-    USUAL_SIZE,
     StatisticalSize,
     view_dtype,
 )
@@ -88,7 +87,7 @@ ALARM_RECORD = record(ratio=float, axis=int, detected_at_s=float, share=MAX_SURF
 
 
 @sized
-def statistical_dtype(size: StatisticalSize = USUAL_SIZE) -> np.dtype:
+def statistical_dtype(size: StatisticalSize) -> np.dtype:
     """The record of the detector, for an aircraft that needs these capacities."""
     return record(
         test=TESTING_RECORD, noise=NOISE_RECORD, rows=ROWS_RECORD, alarm=ALARM_RECORD,

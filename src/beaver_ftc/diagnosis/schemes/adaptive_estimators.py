@@ -158,7 +158,8 @@ def decide_type(fdi, t, started):
 @apart
 def begin_types(fdi):
     """Start the feasible sets of all types at the alarm, with no knowledge of any fault."""
-    examination.restart_types(fdi.types)
+    for srf in fdi.types.surface:
+        examination.restart_surface(srf)
 
 
 @apart

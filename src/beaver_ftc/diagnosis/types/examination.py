@@ -50,13 +50,6 @@ from beaver_ftc.diagnosis.types.registry import (
 
 
 @kernel
-def restart_types(types):
-    """Restart the diagnosis of all surfaces, with no knowledge."""
-    for srf in types.surface:
-        restart_surface(srf)
-
-
-@kernel
 def restart_surface(srf):
     """Restart the diagnosis of one surface, with no knowledge: every type remains, with its whole range."""
     srf.sets.excluded[:] = 0

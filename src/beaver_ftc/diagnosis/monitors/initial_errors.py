@@ -446,12 +446,13 @@ def tighten_bounds(mon):
 
 @kernel
 def update_bounds(mon, y):
-    """Update all bounds by the sample y, which has just been tested. In a steep attitude the tests of turning
-    restart, and so does what the filters have summed of C; E, d, H and H_m then stay as they are."""
+    """Update all bounds by the sample y, which has just been tested.
+
+    In a steep attitude the tests of turning and of the angles restart, so that nothing shows a change of phi
+    or theta. Their E is then E_start, what the filters have summed of their C restarts, and H_m = 1 in the
+    tests of the angles says that these have missed a change: d is E, until the filters have forgotten it.
+    """
     initial = mon.initial
-    if too_steep(mon, y):
-        initial.C_m[:] = 0.0
-        return
     widen_bounds(mon)
     fill_effects(mon, y)
     for n, C in enumerate(initial.C):
@@ -459,6 +460,10 @@ def update_bounds(mon, y):
     for h in range(N_INITIAL):
         for j in range(RPM_TEST):
             leak(initial.H_m[h, j], mon.decay, initial.H[h, j])
+    if too_steep(mon, y):
+        initial.E[H_PHI:] = initial.E_start[H_PHI:]
+        initial.C_m[:ALPHA_IN_BETA] = 0.0
+        initial.H_m[H_PHI:, ANGLE_TEST:SPEED_TEST] = 1.0
     tighten_bounds(mon)
 
 

@@ -58,7 +58,7 @@ def prediction_dtype(n: int) -> np.dtype:
         design=design_dtype(n), actuators=actuators_dtype(n),
         w=float,  # one over the number of instants in a frame
         commanded=n,  # the command in effect
-        u=n, u_old=n,  # positions of healthy surfaces under the command: now, before the last `move_surfaces`
+        u=n, u_old=n,  # positions of healthy surfaces under the command: now, before the last `move_healthy`
         # least and greatest position by the declared errors of the actuators, at the same two times
         u_lo=n, u_hi=n, u_lo_old=n, u_hi_old=n,
         f=3, G=(3, n),  # f and G at this instant
@@ -272,13 +272,13 @@ def innovation_known(pred, x, dt):
 def move_surfaces(pred, command):
     """Move the healthy surfaces by one JSBSim frame towards the new command (n,) rad."""
     pred.commanded[:] = command
-    pred.u_old[:], pred.u_lo_old[:], pred.u_hi_old[:] = pred.u, pred.u_lo, pred.u_hi
     move_healthy(pred)
 
 
 @kernel
 def move_healthy(pred):
     """Move the healthy surfaces, and the ends between which they are, by one JSBSim frame."""
+    pred.u_old[:], pred.u_lo_old[:], pred.u_hi_old[:] = pred.u, pred.u_lo, pred.u_hi
     move(pred.actuators, pred.commanded, pred.u)
     if pred.actuators.uncertain:
         move_ends(pred.actuators, pred.commanded, pred.u_lo, pred.u_hi)

@@ -306,17 +306,15 @@ def estimate_rate(mon, pred, i):
         y_i = y_past_i + gain residual_i / h + h acc_i,    acc = f + G u [+ F_known - F]
 
     acc rad/s2: acceleration by the model, with the effect of surface faults if that conclusion stays; gain:
-    `rate_gain`; u (n,) rad: positions in the elapsed step at the first sample of a frame, else those of now,
-    which a lagging actuator has moved on by a step. The estimate is the y_past of the next sample, whose
-    residual shows its error. In the first sample the reading of the broken gyro is still in y_past: if the
-    attitude is noisy (gain < 1), the filtered residual times its pole, lam r, then takes the place of gain
-    residual / h.
+    `rate_gain`; u (n,) rad: positions in the sample before. The estimate is the y_past of the next sample,
+    whose residual shows its error. In the first sample the reading of the broken gyro is still in y_past: if
+    the attitude is noisy (gain < 1), the filtered residual times its pole, lam r, then takes the place of
+    gain residual / h.
     """
     gain = mon.config.rate_gain
     acc = pred.f[i]
-    u = pred.u_old if mon.substep == 0 else pred.u
-    for s in range(u.size):
-        acc += pred.G[i, s] * u[s]
+    for s, u in enumerate(pred.u_old):
+        acc += pred.G[i, s] * u
     if mon.output.keeps_surface:
         acc += pred.F_known[i] - pred.means.F[i]
     rate = gain * mon.residual[i] / mon.h

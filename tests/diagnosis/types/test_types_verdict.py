@@ -10,6 +10,7 @@ from beaver_ftc.diagnosis.types import (
     SCALE_COMMAND,
     SUBTRACT_OFFSET,
     WAIT_FOR_SURFACE,
+    examination,
     modes,
     pairs,
     verdict,
@@ -123,14 +124,6 @@ def test_the_sole_surface_that_is_possible():
 def test_what_looks_like_a_jam_may_be_slow_until_it_has_stood_off_for_long(evidence, n_rest, slow):
     fdi, surface = one(STUCK, SLOW, evidence=evidence, n_rest=n_rest)
     assert bool(on(verdict.may_be_hidden, fdi, surface)) == slow
-    assert not on(
-        verdict.may_be_hidden,
-        *one(STUCK, evidence=evidence, n_rest=n_rest),
-    )
-    assert not on(
-        verdict.may_be_hidden,
-        *one(SLOW, evidence=evidence, n_rest=n_rest),
-    )
 
 
 @pytest.mark.parametrize(
@@ -184,6 +177,17 @@ def test_what_is_done_about_a_surface(kinds, accommodation_mode):
 
 
 # Examining frames.
+
+
+@pytest.mark.parametrize("resting", [AILERON, FLAP])
+def test_a_rest_does_not_count_where_a_stop_may_hide_a_swing(resting):
+    fdi = new_case()
+    surfaces = fdi["types"]["surface"]
+    fdi["types"]["config"]["abrupt"] = 1
+    surfaces["accommodation"]["mode"][resting] = GIVE_UP
+    surfaces["judged"]["hides"][ELEVATOR] = 1
+    on(examination.judge_frame, fdi)
+    assert not surfaces["evidence"]["n_unhidden"][ELEVATOR]
 
 
 # Two faults at once.

@@ -136,8 +136,7 @@ def judge_frame(types):
            begins: in frame k if a frame has one instant, else in frame k - 1.
         3  rests: `count_rest`. counts: count the anomaly, and test every type with the releases of step 2.
         4  Returns after a release that step 3 has left move on to the end of the frame.
-        5  A frame in which a stop may hide a swing restarts `n_unhidden`. If a surface with a larger number
-           rests, step 3 of that surface then still counts: `n_unhidden` is 1.
+        5  After these steps of all surfaces: a frame in which a stop may hide a swing restarts `n_unhidden`.
 
     rests: the surface is given up, nothing is wrong in the frame, and the fault is declared to stay. counts:
     something is wrong in the frame and, with several instants a frame, also in the one before and after it.
@@ -162,7 +161,8 @@ def judge_frame(types):
         for h in range(N_TYPES):
             if returns and HOLDS[h]:
                 release.advance_returns(c, srf, h)
-        if judged.hides[0] or judged.hides[1]:
+    for srf in types.surface:
+        if srf.judged.hides[0] or srf.judged.hides[1]:
             srf.evidence.n_unhidden = 0
     types.frame_index += 1
 

@@ -70,6 +70,13 @@ def test_the_limits_are_where_the_elevator_there_is_just_suffices(elevator_deg, 
         assert slowest == pytest.approx(speeds[~can].min() if not can.all() else 55.0, abs=0.1)
 
 
+def test_the_bank_limit_ends_with_the_loss():
+    autopilot = table().view(np.recarray)[0]
+    autopilot["holding"]["in_force"] = 1
+    holding.record_limits_in_force(autopilot, (0, 1, 2), np.ones(4), 1.0)
+    assert not autopilot["holding"]["in_force"][holding.BANK_LIMIT]
+
+
 class TestFlights:
     @pytest.mark.parametrize("position_deg", [-6.0, -7.4])
     def test_a_jam_nose_up_is_flown_at_a_speed_that_can_be_held(self, position_deg):

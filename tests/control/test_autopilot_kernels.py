@@ -5,7 +5,7 @@ import pytest
 
 from beaver_ftc.control.autopilot import acceleration_per_power, path_angle_limits
 from beaver_ftc.control.autopilot_setup import AUTOPILOT
-from beaver_ftc.control.profile import SPEED, wrap_to_half_turn
+from beaver_ftc.control.profile import SPEED
 from beaver_ftc.design.table import DPT, QDYN
 from law_records import new_control
 
@@ -58,8 +58,3 @@ def test_without_an_airspeed_the_engine_stays_and_descents_are_free():
     low, high = path_angle_limits(new_autopilot(), PUSH)
     assert low == -0.15
     assert high == pytest.approx(min(0.01 + 0.02 * (V - 35.0), 0.15))
-
-
-@pytest.mark.parametrize("angle", [-9.0, -3.2, -3.1, 0.0, 2.0, 3.2, 9.0])
-def test_a_direction_is_given_within_half_a_turn(angle):
-    assert wrap_to_half_turn(angle) == pytest.approx(np.arctan2(np.sin(angle), np.cos(angle)))

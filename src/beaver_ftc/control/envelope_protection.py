@@ -178,21 +178,19 @@ def approach_airspeed_to_fly(autopilot):
 def record_limits_in_force(autopilot, main, effectiveness, t):
     """Record which limits are in force at t s; main (3,): the surface that leads each axis.
 
-    limits      recorded while                                       in force if
-    airspeed    an airspeed is commanded                             it changes the command by more than
-                                                                     NOTED_MPS
-    bank        ailerons or rudder have lost effectiveness           it is, smoothed over ACTING_S, more
-                                                                     than NOTED_RAD below that in health
+    airspeed    if an airspeed is commanded: while the limit changes it by more than NOTED_MPS
+    bank        while ailerons or rudder have lost effectiveness, and the limit, smoothed over ACTING_S of
+                this time, is more than NOTED_RAD below that in health
     """
     holding, command = autopilot.holding, autopilot.command[SPEED]
     if autopilot.is_commanded[SPEED]:
         record_limit(holding, FASTEST, holding.fastest, holding.fastest < command - NOTED_MPS, t)
         record_limit(holding, SLOWEST, holding.slowest, holding.slowest > command + NOTED_MPS, t)
-    if effectiveness[main[ROLL]] < 1.0 or effectiveness[main[YAW]] < 1.0:
+    lost = effectiveness[main[ROLL]] < 1.0 or effectiveness[main[YAW]] < 1.0
+    if lost:
         holding.bank += autopilot.dt / ACTING_S * (autopilot.bank_limit - holding.bank)
-        record_limit(
-            holding, BANK_LIMIT, holding.bank, holding.bank < autopilot.max_healthy_bank - NOTED_RAD, t
-        )
+    limited = lost and holding.bank < autopilot.max_healthy_bank - NOTED_RAD
+    record_limit(holding, BANK_LIMIT, holding.bank, limited, t)
 
 
 @kernel

@@ -44,7 +44,9 @@ def fill_table(
 ) -> None:
     """Write terms, sorted as `Aircraft.moments` are, into a record; `scale` multiplies single values."""
     scale = scale or {}
-    needed = [_monomial(term, aircraft) for term in terms]
+    place = aircraft.signal_names.index
+    # the monomial of each term: the places of its signals, each once for each power, in ascending order
+    needed = [tuple(sorted(place(name) for name, power in term.of for _ in range(power))) for term in terms]
     chain = _chain(needed)
     fill(
         table, span=aircraft.geometry.span_m, chord=aircraft.geometry.chord_m, n_terms=len(terms),
@@ -62,11 +64,6 @@ def fill_table(
         table["free_from"][i] = first
         table["free_to"][i] = first + sum(term.surface is None for term in own_terms)
         first = table["surface_to"][i] = first + len(own_terms)
-
-
-def _monomial(term: Term, aircraft: Aircraft) -> tuple[int, ...]:
-    """The monomial of a term: the numbers of its signals, each once for each power, in ascending order."""
-    return tuple(sorted(aircraft.signal_names.index(name) for name, power in term.of for _ in range(power)))
 
 
 def _chain(wanted: Iterable[tuple[int, ...]]) -> list[tuple[int, ...]]:

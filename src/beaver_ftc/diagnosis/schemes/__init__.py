@@ -39,8 +39,8 @@ from beaver_ftc.diagnosis.state import (
     WORST_CASE_DETECTOR,
 )
 from beaver_ftc.diagnosis.types import records
-from beaver_ftc.diagnosis.types.registry import SAME_NAME
-from beaver_ftc.diagnosis.types.verdict import DEDUCED_FAULTY, TYPE_UNDECIDED, name_remains
+from beaver_ftc.diagnosis.types.registry import NAMED, SAME_NAME
+from beaver_ftc.diagnosis.types.verdict import DEDUCED_FAULTY, TYPE_UNDECIDED, any_remains
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.diagnosis import pairs_refused
@@ -61,14 +61,17 @@ def fdi_dtype(n: int, size: StatisticalSize = USUAL_SIZE) -> np.dtype:
 
 
 def configure_diagnosis(fdi: np.void, pred: np.void, declared: Declared, travel: np.ndarray) -> None:
-    """Fill in the stages of the diagnosis; pred: already filled in. travel (2, n) rad: the stops."""
+    """Fill in the stages of the diagnosis; pred: already filled in. travel (2, n) rad: the stops.
+
+    Raises BadInput where a change in flight declares errors with which pairs are not available.
+    """
     config, aircraft, dt = declared.fdi, declared.aircraft, 1.0 / declared.rate_hz
     rows = isolation.list_estimators(config.fault_class, aircraft)
     state.configure_shared(fdi["config"], declared)
     state.configure_layout(fdi["layout"], rows, aircraft)
     isolation.configure_isolation(fdi["isolation"], declared, rows, travel)
-    if config.pairs:
-        _refuse_pairs(declared)
+    if config.pairs and (refusal := pairs_refused(declared.sensors.declared, aircraft)):
+        raise BadInput(f"{declared.name}: fdi.pairs: {refusal}, allowed: false")
     bounds.configure_bound(fdi["bound"], declared, pred["design"])
     filters.configure_bank(fdi["bank"], config, declared, dt)
     fdae.configure_fdae(fdi["fdae"], declared)
@@ -91,12 +94,6 @@ def prepare_takeover(fdi: np.void, in_flight: bool) -> None:
         memory = fdi["statistical"][name]["memory"]
         fill(memory, turn_past=in_flight, start_share=in_flight, start_left=in_flight)
     fdi["sensor_monitor"]["substep"] = 0
-
-
-def _refuse_pairs(declared: Declared) -> None:
-    """Raises BadInput where a change in flight declares errors with which pairs are not available."""
-    if refusal := pairs_refused(declared.sensors.declared, declared.aircraft):
-        raise BadInput(f"{declared.name}: fdi.pairs: {refusal}, allowed: false")
 
 
 @kernel
@@ -136,7 +133,7 @@ def reason_of_withdrawal(fdi, s, isolated):
         return SURFACE_REFUTED
     refuted = s == fdi.types.pair.first_pitch and surf.status.basis == DEDUCED_FAULTY
     named = fdi.verdict.isolated_type[s] if isolated else TYPE_UNDECIDED
-    if cfg.diagnoses_all_types and (refuted or not name_remains(surf, named)):
+    if cfg.diagnoses_all_types and (refuted or not any_remains(surf, NAMED[named])):
         return TYPES_REFUTED
     return SEVERAL_POSSIBLE
 

@@ -34,7 +34,6 @@ from beaver_ftc.diagnosis.types.registry import (
     MODE,
     N_CONSTANT,
     N_TYPES,
-    NAMED,
     SAME_NAME,
     SHOW_HALF_CYCLES,
     STOP_SIDE,
@@ -89,12 +88,6 @@ def any_remains(srf, mask):
 def constant_remains(srf):
     """Whether a type with a constant parameter remains."""
     return any_remains(srf, CONSTANT)
-
-
-@kernel
-def name_remains(srf, named):
-    """Whether a type of the name of type `named` remains; with TYPE_UNDECIDED, one of any name."""
-    return any_remains(srf, NAMED[named])
 
 
 @kernel
@@ -280,15 +273,11 @@ def update_status(srf, is_isolated, kind, t):
 
 @kernel
 def finding_on_surface(types, past, layout, s, t):
-    """The finding on surface s, or that of s = NOT_ISOLATED or UNANTICIPATED."""
+    """The finding on surface s, or that of s = NOT_ISOLATED or UNANTICIPATED. A type whose command is scaled
+    has the estimator of the loss, any other, and an open one, that of the position."""
     if s >= 0:
         status = types.surface[s].status
         kind = status.fault_type
-        return (estimator_of_fault(layout, s, kind), status.isolated_at_s, kind, status.typed_at_s)
+        j = layout.loss[s] if kind >= 0 and MODE[kind] == SCALE_COMMAND else layout.position[s]
+        return (j, status.isolated_at_s, kind, status.typed_at_s)
     return (s, t if s != past.isolated_estimator else past.isolated_at_s, TYPE_UNDECIDED, past.typed_at_s)
-
-
-@kernel
-def estimator_of_fault(layout, s, h):
-    """The estimator that stands for a fault of type h (TYPE_UNDECIDED if open) on surface s."""
-    return layout.loss[s] if h >= 0 and MODE[h] == SCALE_COMMAND else layout.position[s]

@@ -37,7 +37,7 @@ from beaver_ftc.documents.files import cache_of_version, digest_of_files
 # mypy: disable-error-code="attr-defined,method-assign,assignment"
 
 
-__all__ = ["apart", "direct", "fill", "kernel", "plain", "record", "row_of", "sized"]
+__all__ = ["apart", "copy", "direct", "fill", "kernel", "plain", "record", "row_of", "sized"]
 
 KNOWN = ("0.68",)  # versions of Numba whose inside is as we have found it
 VARIABLE = "BEAVER_FTC_COMPILER"  # `numba`: as with a version that is not known
@@ -253,3 +253,13 @@ def _one_or(own: int, each: Kernel, others: Kernel) -> Kernel:
         return each(*arguments) if number == own else others(number, *arguments)
 
     return call
+
+
+@kernel
+def copy(source, target):
+    """Write each number of an array into another one of the same shape, which shares no memory with it.
+
+    `target[:] = source` has code besides for two arrays that share some: it allocates.
+    """
+    for i in range(target.size):
+        target.flat[i] = source.flat[i]

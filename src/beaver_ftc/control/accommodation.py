@@ -29,7 +29,7 @@ Records among the arguments, and the file that defines each:
 
 import numpy as np
 
-from beaver_ftc.compiled import apart, fill, kernel, record, sized
+from beaver_ftc.compiled import apart, copy, fill, kernel, record, sized
 from beaver_ftc.control.profile import clamp
 from beaver_ftc.design.model import unanticipated_pitch
 from beaver_ftc.diagnosis.state import PITCH, UNANTICIPATED
@@ -157,7 +157,8 @@ def begin_frame(output, authority_lost):
 @kernel
 def take_offsets(output, assessment):
     """Take offset and lag (n,) rad of all surfaces from the diagnosis."""
-    output.offset[:], output.lag[:] = assessment.offset, assessment.lag
+    copy(assessment.offset, output.offset)
+    copy(assessment.lag, output.lag)
 
 
 @kernel
@@ -206,7 +207,7 @@ def estimate_unknown(output, config, assessment, faults, prediction, y):
     if config.informed:
         output.unknown[PITCH] = unanticipated_pitch(prediction.design, y, faults.Cm_alpha3)
     elif config.uses_verdict:
-        output.unknown[:] = assessment.unknown_acceleration
+        output.unknown = assessment.unknown_acceleration
 
 
 @kernel

@@ -24,7 +24,7 @@ Words for surfaces:
 import numpy as np
 
 from beaver_ftc.aircraft import AXES, Aircraft, main_surface_index_by_axis
-from beaver_ftc.compiled import apart, fill, kernel, record, sized
+from beaver_ftc.compiled import apart, copy, fill, kernel, record, sized
 from beaver_ftc.control.accommodation import usable_effectiveness
 from beaver_ftc.control.least_squares import FREE, LOW, problem_dtype, solve
 from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
@@ -177,7 +177,7 @@ def form_effectiveness_matrix(axes, G, surfaces, uses_verdict):
     """Fill axes.G: the design model's G, times the `usable_effectiveness` of each surface if the law uses the
     verdict."""
     if not uses_verdict:
-        axes.G[:] = G
+        copy(G, axes.G)
         return
     for s in range(G.shape[1]):
         effectiveness = usable_effectiveness(surfaces, s)

@@ -24,7 +24,7 @@ from math import sqrt
 
 import numpy as np
 
-from beaver_ftc.compiled import kernel, record, sized
+from beaver_ftc.compiled import copy, kernel, record, sized
 
 LOW, FREE, HIGH = -1, 0, 1
 SLACK = 1e-10  # of the mean of the diagonal of B v B'
@@ -98,7 +98,8 @@ def multipliers(problem, B, demand):
     by Cholesky: S = L L', L z = d - B u0, L' y = z. L takes the place of S, and z that of y in between.
     """
     S, y, slack = problem.S, problem.y, problem.slack
-    S[:], y[:] = 0.0, demand
+    S[:] = 0.0
+    copy(demand, y)
     for i in range(3):
         S[i, i] = slack
     for s in range(problem.u.size):

@@ -8,7 +8,7 @@ actuator is the declared one is exactly where the model predicts it. u; command,
 
 import numpy as np
 
-from beaver_ftc.compiled import kernel, record, sized
+from beaver_ftc.compiled import copy, kernel, record, sized
 
 
 @sized
@@ -49,7 +49,7 @@ def farthest(u, command, sign, approaches, steps, band, low, high):
 def move(actuators, command, u):
     """Move the surfaces u (n,) rad by one JSBSim frame towards command (n,) rad."""
     if not actuators.real:
-        u[:] = command
+        copy(command, u)
         return
     for s in range(u.size):
         target = min(max(command[s], actuators.low[s]), actuators.high[s])

@@ -36,7 +36,7 @@ import numpy as np
 from beaver_ftc.aircraft import Aircraft, MassProperties, load
 from beaver_ftc.aircraft.aircraft import MOMENTS
 from beaver_ftc.aircraft.schema import MAX_MONOMIALS
-from beaver_ftc.compiled import kernel, plain, record, sized
+from beaver_ftc.compiled import copy, kernel, plain, record, sized
 from beaver_ftc.design.table import (
     AIRSPEED,
     ALPHA,
@@ -57,6 +57,7 @@ from beaver_ftc.design.table import (
     whole_sum,
 )
 
+_ALONG = np.eye(N_SIGNALS)  # each signal by itself: the directions of `directional`
 _STEP = 1e-30  # of a complex step: far below rounding, so the derivative is exact to rounding
 
 # What multiplies rate products and moments in the accelerations; SI units.
@@ -117,9 +118,10 @@ def response(design, x, y, f, G):
     if design.linearised:
         linear_response(design, x, y, f, G)
     elif design.frozen_alpha:
-        frozen = y.copy()
-        frozen[ALPHA] = design.y0[ALPHA]
-        nonlinear_response(design, x, frozen, f, G)
+        alpha = y[ALPHA]
+        y[ALPHA] = design.y0[ALPHA]
+        nonlinear_response(design, x, y, f, G)
+        y[ALPHA] = alpha
     else:
         nonlinear_response(design, x, y, f, G)
 
@@ -140,7 +142,7 @@ def linear_response(design, x, y, f, G):
             f[i] += design.f_x[i, j] * (x[j] - design.x0[j])
         for j in range(y.size):
             f[i] += design.f_y[i, j] * (y[j] - design.y0[j])
-    G[:] = design.G0
+    copy(design.G0, G)
 
 
 @kernel
@@ -201,9 +203,7 @@ def rate_damping(design, x, y, u, scratch, out):
     table = design.moments
     evaluate(table, x, y)
     for j, rate in enumerate((PH, QH, RH)):
-        direction = np.zeros(N_SIGNALS)
-        direction[rate] = 1.0
-        directional(table, table.signal, table.power, direction, scratch)
+        directional(table, table.signal, table.power, _ALONG[rate], scratch)
         per_rate = design.c / y[AIRSPEED] if j == 1 else design.b / (2 * y[AIRSPEED])
         for i in range(3):
             out[i, j] = whole_sum(table, i, scratch, u) * per_rate
@@ -304,7 +304,7 @@ def responses_at(design: np.void, x: np.ndarray, y: np.ndarray) -> tuple[np.ndar
     """f (n, 3) rad/s2 and G (n, 3, surfaces) rad/s2 per rad of `response` at n states: x (n, 3) rad/s, y (n,
     4 + declared)."""
     f, G = np.empty(x.shape), np.zeros((len(x), *design["G0"].shape))
-    responses(design, np.ascontiguousarray(x), np.ascontiguousarray(y), f, G)
+    responses(design, np.ascontiguousarray(x), np.array(y, order="C"), f, G)
     return f, G
 
 

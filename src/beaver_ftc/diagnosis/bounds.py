@@ -36,7 +36,7 @@ import numpy as np
 from beaver_ftc.aircraft import AXES, MassProperties
 from beaver_ftc.aircraft.aircraft import EARTH_RATE_RAD_S
 from beaver_ftc.aircraft.schema import MAX_LEVELS
-from beaver_ftc.compiled import fill, kernel, record, sized
+from beaver_ftc.compiled import copy, fill, kernel, record, sized
 from beaver_ftc.design import LEAST_HEIGHT_M
 from beaver_ftc.design.engine import DPT_0, KW_TO_DPT, density_ratio, power_error_kw
 from beaver_ftc.design.model import (
@@ -251,7 +251,7 @@ def fill_bound(bound, model, meas, u):
         set_air_rotation(err, meas.altitude)
         add_declared_bound(err, x, y, u, eta)
     else:
-        err.x[WORST, :] = x  # without errors, the worst rates are those measured
+        copy(x, err.x[WORST])  # without errors, the worst rates are those measured
     if emap.n_boxes > 0:
         look_up_map(emap, x, y, u, err.du)
         for i in range(3):

@@ -20,7 +20,7 @@ the output of the diagnosis, and only this file writes it.
 
 import numpy as np
 
-from beaver_ftc.compiled import fill, kernel, record, sized
+from beaver_ftc.compiled import copy, fill, kernel, record, sized
 from beaver_ftc.diagnosis.detection import statistical
 from beaver_ftc.diagnosis.detection.fdae import fdae_unmodelled
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, WORST_CASE_DETECTOR
@@ -115,7 +115,7 @@ def record_plugin_verdict(conclusion, plugin, t):
         latch_alarm(conclusion, plugin.axis, t)
     set_isolated(conclusion, plugin.isolated if conclusion.detected else NOT_ISOLATED, t)
     conclusion.has_effectiveness = plugin.has_effectiveness
-    conclusion.effectiveness[:] = plugin.effectiveness
+    copy(plugin.effectiveness, conclusion.effectiveness)
 
 
 @kernel

@@ -22,7 +22,7 @@ import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.aircraft.schema import MAX_AGES, MAX_LEVELS
-from beaver_ftc.compiled import fill, kernel, record, sized
+from beaver_ftc.compiled import copy, fill, kernel, record, sized
 from beaver_ftc.design.table import AIRSPEED, N_Y, QDYN
 
 UNMAPPED_ERROR_RAD_S2 = 1e6  # terms fitted near trim are off by thousands at 0.5 rad
@@ -157,14 +157,15 @@ def look_up_map(emap, x, y, u, du):
     Outside all boxes, or after the last row, the bounds are the UNMAPPED ones. Density: 2 qdyn / V^2.
     """
     z = emap.coordinates
-    z[:3], z[3 : 3 + y.size] = x, y
+    copy(x, z[:3])
+    copy(y, z[3 : 3 + y.size])
     z[3 + QDYN] = 2.0 * y[QDYN] / (y[AIRSPEED] * y[AIRSPEED])
     j = level_of_positions(emap, u, du)
     k = map_row(emap)
     for b in range(emap.n_boxes if k >= 0 else 0):
         if in_box(emap, b):
             emap.outside = 0
-            emap.e_now[:] = emap.e[k, b, j]
+            copy(emap.e[k, b, j], emap.e_now)
             emap.box = b
             emap.row = k
             emap.Cn_now = emap.Cn[b]

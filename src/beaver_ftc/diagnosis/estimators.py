@@ -33,7 +33,7 @@ a constant loss (`fdi.fault_profile: abrupt`) the sets of all frames since the a
 
 import numpy as np
 
-from beaver_ftc.compiled import kernel, record
+from beaver_ftc.compiled import copy, kernel, record
 from beaver_ftc.diagnosis.detection.filters import advance_bound, published_interval, residual_interval
 from beaver_ftc.diagnosis.sets import explain, intersect
 from beaver_ftc.diagnosis.state import INTERVAL_THRESHOLD, PUBLISHED_THRESHOLD
@@ -138,7 +138,8 @@ def start_estimators(iso, n, x):
     The set of a constant theta is the known one on every axis, or without limits if iso.config.free.
     """
     for fie in iso.estimator[: iso.config.n_estimators]:
-        fie.xhat[:], fie.B_lag[:] = x, n
+        copy(x, fie.xhat)
+        copy(n, fie.B_lag)
         fie.P[:] = (fie.theta_max - fie.theta_min) ** 2 / 12.0  # of a uniform distribution
         fie.set_lo[:] = -np.inf if iso.config.free else fie.theta_min
         fie.set_hi[:] = np.inf if iso.config.free else fie.theta_max

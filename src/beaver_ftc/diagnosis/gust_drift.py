@@ -157,5 +157,5 @@ def finish_turn_variance(gust):
         for i in range(3):
             for k in range(3):
                 out.var_turn[i, k] = mem.var_prev[i, k] + mem.var_now[i, k]
-        mem.var_prev[:] = mem.var_now
+        mem.var_prev = mem.var_now
         mem.var_now[:] = 0.0

@@ -183,7 +183,7 @@ def update_axes(gust, z):
     the rows of T in the level axes of that step.
     """
     T, C = gust.memory.T, gust.output.C
-    gust.memory.C_dot[:] = C
+    gust.memory.C_dot = C
     for i in range(3):
         C[i, :] = turned(T[i], z.conjugate())
 
@@ -344,7 +344,7 @@ def fill_specific_force(gust, x, y, u):
     the bank, or by the design model; arguments as in `fill_force`."""
     mem = gust.memory
     if gust.output.uses_accelerometers:
-        mem.f[:] = mem.f_read
+        mem.f = mem.f_read
     elif gust.config.coarse_only:
         mem.f[0] = mem.f[1] = 0.0
         mem.f[2] = -gust.config.gravity / max(mem.T[2, 2], MIN_BANK_COSINE)
@@ -356,7 +356,7 @@ def fill_specific_force(gust, x, y, u):
 def begin_gust_sums(gust, V, dt):
     """Start acc_sum of the next frame with this instant, and add to var_now what the turn of C does in the
     dt s to the next instant; V m/s."""
-    gust.memory.acc_sum[:] = gust.output.acc
+    gust.memory.acc_sum = gust.output.acc
     add_turn_variance(gust, V, dt)
 
 

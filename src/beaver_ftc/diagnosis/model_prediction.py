@@ -13,7 +13,7 @@ from math import pi
 
 import numpy as np
 
-from beaver_ftc.compiled import fill, kernel, record, sized
+from beaver_ftc.compiled import copy, fill, kernel, record, sized
 from beaver_ftc.design.actuators import actuators_dtype, move, move_ends
 from beaver_ftc.design.model import design_dtype, design_of, response
 from beaver_ftc.diagnosis.bounds import fill_bound, n_gyro
@@ -156,15 +156,18 @@ def fill_means(pred, bound):
     F = f + G u, the extremes, and the bounds eta_bar, eG and eGu. G_old keeps the G of the frame before. With
     several instants a frame, fill e_Gu, too."""
     sums, means = pred.sums, pred.means
-    means.G_old[:] = means.G
-    means.G[:] = sums.G
-    means.Gu[:] = sums.Gu
-    means.F[:] = sums.F
-    means.G_min[:], means.G_max[:] = sums.G_min, sums.G_max
-    means.u_min[:], means.u_max[:] = sums.u_min, sums.u_max
-    bound.eta_bar[:] = sums.eta_bar
+    copy(means.G, means.G_old)
+    copy(sums.G, means.G)
+    copy(sums.Gu, means.Gu)
+    means.F = sums.F
+    copy(sums.G_min, means.G_min)
+    copy(sums.G_max, means.G_max)
+    copy(sums.u_min, means.u_min)
+    copy(sums.u_max, means.u_max)
+    bound.eta_bar = sums.eta_bar
     if bound.has_eG:
-        bound.eG[:], bound.eGu[:] = sums.eG, sums.eGu
+        copy(sums.eG, bound.eG)
+        copy(sums.eGu, bound.eGu)
     if pred.w < 1.0:
         fill_change_tolerance(pred)
 
@@ -204,7 +207,7 @@ def evaluate_frame(pred, bound, meas, k, dt):
     bound.error_map.time_s = k * dt
     fill_deflection_errors(pred, bound.declared_errors)
     fill_bound(bound, pred.design, meas, pred.u)
-    bound.eta_bar[:] = bound.eta_now
+    bound.eta_bar = bound.eta_now
     if bound.declared_errors.given:
         for i in range(3):
             bound.n_gyro[i] = n_gyro(bound.declared_errors, i, meas.x[i])
@@ -217,20 +220,23 @@ def begin_sums(pred, bound, layout, all_types, meas):
     """Restart the sums for the next frame with this instant, at which the old command is still in effect. Its
     rates and n_gyro become those of the start of the frame."""
     sums = pred.sums
-    pred.x_before[:], bound.n_old[:] = meas.x, bound.n_gyro
+    pred.x_before = meas.x
+    bound.n_old = bound.n_gyro
     sums.F[:] = sums.eta_bar[:] = bound.extra[:] = 0.0
     sums.G[:] = sums.Gu[:] = sums.eG[:] = sums.eGu[:] = 0.0
     sums.G_min[:] = sums.u_min[:] = np.inf
     sums.G_max[:] = sums.u_max[:] = -np.inf
     add_to_sums(pred, bound, layout, all_types)
-    sums.Gu_first[:] = sums.Gu
+    copy(sums.Gu, sums.Gu_first)
 
 
 @kernel
 def redo_move(pred, command):
     """Take back the last `move_surfaces`, and move by the same JSBSim frame towards another command (n,) rad,
     which replaces it (`stepping.hold`)."""
-    pred.u[:], pred.u_lo[:], pred.u_hi[:] = pred.u_old, pred.u_lo_old, pred.u_hi_old
+    copy(pred.u_old, pred.u)
+    copy(pred.u_lo_old, pred.u_lo)
+    copy(pred.u_hi_old, pred.u_hi)
     move_surfaces(pred, command)
 
 
@@ -253,7 +259,7 @@ def predict_known(pred, with_faults, effectiveness, bias, with_biases):
     `with_biases`, the last sum is left out.
     """
     F, means = pred.F_known, pred.means
-    F[:] = means.F
+    copy(means.F, F)
     if with_faults:
         for i in range(3):
             for s in range(bias.size):
@@ -271,7 +277,7 @@ def innovation_known(pred, x, dt):
 @kernel
 def move_surfaces(pred, command):
     """Move the healthy surfaces by one JSBSim frame towards the new command (n,) rad."""
-    pred.commanded[:] = command
+    copy(command, pred.commanded)
     move_healthy(pred)
 
 

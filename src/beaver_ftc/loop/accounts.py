@@ -87,7 +87,8 @@ def follow_guarantee(guarantee, bank, dt, share, k, t):
     diagnosis' frame; with its first one, of 0, its filters are empty, whatever went before.
     """
     if k == 0:
-        guarantee.effect[:], guarantee.phi_sum[:], guarantee.certain_after_s = 0.0, guarantee.phi, -1.0
+        guarantee.effect[:], guarantee.certain_after_s = 0.0, -1.0
+        guarantee.phi_sum = guarantee.phi
         return
     for i in range(3):
         mean = share * guarantee.phi_sum[i]

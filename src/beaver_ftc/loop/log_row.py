@@ -3,7 +3,7 @@ number."""
 
 import numpy as np
 
-from beaver_ftc.compiled import kernel
+from beaver_ftc.compiled import copy, kernel
 from beaver_ftc.control.profile import SPEED
 from beaver_ftc.diagnosis.detection.filters import nearest_filter
 from beaver_ftc.plant import channels as ch
@@ -140,4 +140,4 @@ def record_row(frame, commanded, row):
     detector = fdi.statistical
     if logged.tests and detector.test.enabled:
         n = detector.test.n_scores
-        row[row.size - n :] = detector.alarm.share[:n]
+        copy(detector.alarm.share[:n], row[row.size - n :])

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.compiled import kernel, record, sized
+from beaver_ftc.compiled import copy, kernel, record, sized
 from beaver_ftc.design.engine import measured_slipstream
 from beaver_ftc.design.table import AIRSPEED, ALPHA, BETA, N_Y, QDYN
 from beaver_ftc.scenario.sensors import N_IN_EQUATIONS, NOISE_LIMIT_SIGMA, ROWS, SIGNALS
@@ -221,7 +221,8 @@ def break_all(instruments, signals, missing):
 def take_sample(measured, x, y, attitude):
     """Take a sample from outside in the place of the instruments': x (3,) rad/s, y signals, attitude (3,)
     rad."""
-    measured.x[:], measured.attitude[:] = x, attitude
+    copy(x, measured.x)
+    copy(attitude, measured.attitude)
     for i in range(y.size):
         measured.y[i] = y[i]
 

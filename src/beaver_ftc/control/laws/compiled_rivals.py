@@ -5,7 +5,7 @@ The surfaces that lead roll, pitch and yaw move; the others stay in trim.
 
 import numpy as np
 
-from beaver_ftc.compiled import apart, kernel, record, sized
+from beaver_ftc.compiled import apart, copy, kernel, record, sized
 from beaver_ftc.control import CompiledLaw
 from beaver_ftc.control.allocation import take_command
 
@@ -37,7 +37,7 @@ def command(control, assessment, faults, prediction, measured, mode, t):
     law, reference, layout = control.compiled_rivals, control.reference, control.layout
     allocated, target = control.allocation.output, reference.output
     u = allocated.command
-    u[:] = layout.trim
+    copy(layout.trim, u)
     add_command(
         law, reference.config.dt, target.model_rate, target.model_acceleration, layout.main, measured.x,
         prediction.means.Gu, prediction.G, control.axes.demand, u,
@@ -111,7 +111,8 @@ def increment(law, dt, rate, acceleration, main, x, Gu, G, demand, u):
     solve(G, main, demand, u)
     for i in range(3):
         demand[i] -= memory.surface_filter[1, i]
-    memory.begun, memory.x_before[:] = 1, x
+    memory.begun = 1
+    copy(x, memory.x_before)
 
 
 @kernel

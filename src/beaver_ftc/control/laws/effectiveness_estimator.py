@@ -27,7 +27,7 @@ with it along the covariance, to the most likely values.
 
 import numpy as np
 
-from beaver_ftc.compiled import apart, kernel, record, sized
+from beaver_ftc.compiled import apart, copy, kernel, record, sized
 from beaver_ftc.compiled.records import Room
 from beaver_ftc.design.table import ALPHA, BETA
 
@@ -117,7 +117,7 @@ def estimate(estimator, innovation, L_rate, L_disturbance, dt, x, y, effectivene
     for j in range(h.size):
         P[j, j] = min(P[j, j] + prior[j] * dt / _FORGOTTEN_S, max(P[j, j], prior[j]))
     signal[0], signal[1] = y[ALPHA], y[BETA]
-    signal[2:] = x
+    copy(x, signal[2:])
     for i in range(3):
         L, M, assumed = L_rate[i], L_disturbance[i], 0.0
         h[:] = 0.0

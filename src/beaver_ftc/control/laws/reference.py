@@ -16,7 +16,7 @@ Once authority is lost, the reference is governed, in two ways:
 
 import numpy as np
 
-from beaver_ftc.compiled import fill, kernel, record
+from beaver_ftc.compiled import copy, fill, kernel, record
 from beaver_ftc.scenario.diagnosis import ControlConfig
 
 MISSED_RAD_S = 0.1  # integral of the shortfall that brings the scale from 1 to 0
@@ -74,7 +74,7 @@ def advance(config, xm, dxm, ref):
 @kernel
 def follow(config, output, commanded):
     """Advance the model, xm and xm' (3,), by one frame towards `commanded` (3,) rad/s."""
-    output.commanded_rate[:] = commanded
+    copy(commanded, output.commanded_rate)
     xm, dxm = output.model_rate, output.model_acceleration
     for i in range(3):
         xm[i], dxm[i] = advance(config, xm[i], dxm[i], commanded[i])
@@ -97,8 +97,8 @@ def govern(reference, commanded, shortfall, authority_lost):
     if authority_lost:
         governor.active = 1
     if not governor.active:
-        output.governed_rate[:] = output.model_rate
-        output.governed_acceleration[:] = output.model_acceleration
+        output.governed_rate = output.model_rate
+        output.governed_acceleration = output.model_acceleration
         return
     dt, xm, dxm = config.dt, output.governed_rate, output.governed_acceleration
     for i in range(3):

@@ -29,7 +29,7 @@ from math import exp, sqrt
 import numpy as np
 
 from beaver_ftc.aircraft import AXES
-from beaver_ftc.compiled import apart, fill, kernel, record, row_of, sized
+from beaver_ftc.compiled import apart, copy, fill, kernel, record, row_of, sized
 from beaver_ftc.control import CompiledLaw, accommodation, allocation, laws
 from beaver_ftc.control.accommodation import approach, begin_frame, give_up, start_of, take_offsets
 from beaver_ftc.control.laws.effectiveness_estimator import (
@@ -284,7 +284,7 @@ def observe(law, output, main, x, design, moments, G):
     xhat, d = observer.rate, observer.disturbance
     if not observer.begun:
         observer.begun = 1
-        xhat[:] = x
+        copy(x, xhat)
         return
     for i in range(3):
         xhat[i] += law.config.dt * (explained(output, i, design, moments, G) + d[i])

@@ -78,25 +78,25 @@ def accommodate(control, assessment, faults, prediction, measured):
     begin_frame(surfaces.output, False)
     if assessment.detected and law.config.adapts:
         saturated, reference = control.allocation.output.saturated, control.reference
-        error = reference.output.governed_rate - x
-        adapt(law, surfaces, main, saturated, error, prediction.G, prediction.u, reference.config.dt)
+        wanted = reference.output.governed_rate
+        adapt(law, surfaces, main, saturated, wanted, x, prediction.G, prediction.u, reference.config.dt)
     evaluate_state_network(law.network, main, x, measured.y, prediction.u)
 
 
 @kernel
-def adapt(law, surfaces, main, saturated, error, G, u, dt):
+def adapt(law, surfaces, main, saturated, wanted, x, G, u, dt):
     """Advance both parts by a step of dt s, with signal = -sigma (3,), rad/s:
 
-        sigma = e + c int e
+        sigma = e + c int e    e = wanted - x
         effectiveness_s <- Proj(effectiveness_s + dt gamma sum_i signal_i G_is u_s)
 
-    s: the surfaces main (3,) that lead the axes; the network only if config.networks. error (3,) rad/s: e; G
+    s: the surfaces main (3,) that lead the axes; the network only if config.networks. wanted, x (3,) rad/s; G
     (3, n) rad/s2 per rad; u (n,) rad; gamma: config.gain, c: config.integral_weight. While the surface that
     leads an axis is at its stop, what the axis misses teaches nothing.
     """
     config, signal = law.config, law.memory.signal
     for i in range(3):
-        signal[i] = -(error[i] + config.integral_weight * law.feedback.memory.integral[i])
+        signal[i] = -(wanted[i] - x[i] + config.integral_weight * law.feedback.memory.integral[i])
         if saturated[main[i]]:
             signal[i] = 0.0
     for s in main:

@@ -58,7 +58,7 @@ from math import exp, sqrt
 import numpy as np
 
 from beaver_ftc.aircraft import AXES
-from beaver_ftc.compiled import fill, kernel, record, sized
+from beaver_ftc.compiled import copy, fill, kernel, record, sized
 from beaver_ftc.diagnosis.detection.filters import leak
 from beaver_ftc.diagnosis.detection.likelihood import (
     DRIFT_PRIOR_RAD_S2,
@@ -155,7 +155,7 @@ def compare_attitude(att, blocks, eta, x, dt, detected):
     pitch, lateral = blocks[PITCH_BLOCK], blocks[LATERAL_BLOCK]
     block_of_axis = lateral, pitch, lateral
     sum_turns(att, x, dt)
-    att.xi[:] = att.s[:, 1]
+    copy(att.s[:, 1], att.xi)
     for i, blk in enumerate(block_of_axis):
         advance_axis(att, i, blk, BLOCK_ROWS[i], eta[i], dt, detected)
     att.score, att.gyro = 0.0, -1

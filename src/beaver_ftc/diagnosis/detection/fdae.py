@@ -22,7 +22,7 @@ from math import exp
 
 import numpy as np
 
-from beaver_ftc.compiled import fill, kernel, record, row_of
+from beaver_ftc.compiled import copy, fill, kernel, record, row_of
 from beaver_ftc.diagnosis.detection.directions import project
 from beaver_ftc.diagnosis.detection.filters import advance_bound
 from beaver_ftc.scenario.declared import Declared
@@ -63,8 +63,10 @@ def configure_fdae(fdae: np.void, declared: Declared) -> None:
 def start(bank, fdae, x, n):
     """Start FDAE and bank at the first measurement x (3,) rad/s; n (3,) rad/s: bounds on the changing part of
     the errors of the gyros, which the filters contain from the start."""
-    fdae.memory.xhat[:], fdae.memory.m[:] = x, n
-    bank.memory.e[: bank.config.n_filters] = n
+    copy(x, fdae.memory.xhat)
+    copy(n, fdae.memory.m)
+    for e in bank.memory.e[: bank.config.n_filters]:
+        copy(n, e)
 
 
 @kernel

@@ -32,7 +32,7 @@ import numpy as np
 
 from beaver_ftc.aircraft import Aircraft, Term
 from beaver_ftc.aircraft.schema import MAX_SURFACES, MAX_TERMS_OF_ONE
-from beaver_ftc.compiled import kernel, record
+from beaver_ftc.compiled import copy, kernel, record
 from beaver_ftc.design.table import AIRSPEED, ALPHA, BETA, N_Y
 from beaver_ftc.diagnosis.detection.directions import project
 from beaver_ftc.diagnosis.gusts import drop_accelerometers
@@ -100,7 +100,7 @@ def fill_vaneless_y(forces, w, y):
     The aircraft turns at x - w relative to the air, so e / q_ratio contains -L' w, which is no effect of the
     angle.
     """
-    forces.y_free[:] = y
+    copy(y, forces.y_free)
     for i, f in enumerate(forces.component):
         e_w = project(f.L, w, False)
         forces.y_free[VANES[i]] -= (f.innovation / forces.q_ratio + e_w) / f.vane[VANE_E]

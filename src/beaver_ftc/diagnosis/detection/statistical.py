@@ -122,7 +122,7 @@ def update_blocks(stat, dt, k, alarmed, may_end=False):
             if m < likelihood.REVERTING_BLOCK:
                 whiten_calm(b, dt)
             else:  # without gust both blocks of roll and yaw have the same filter
-                b.calm.g[:] = blocks[LATERAL_BLOCK].calm.g
+                b.calm.g = blocks[LATERAL_BLOCK].calm.g
         likelihood.update_block(b, dt, decay, cfg.forget if may_end else 0.0, cfg.mapped)
 
 

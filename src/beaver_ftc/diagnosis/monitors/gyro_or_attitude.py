@@ -23,7 +23,7 @@ from beaver_ftc.diagnosis.detection import attitude
 from beaver_ftc.diagnosis.detection.filters import bank_axis, leak
 from beaver_ftc.diagnosis.monitors.initial_errors import exceeds
 from beaver_ftc.diagnosis.monitors.numbering import ANGLE_TEST, N_POLES
-from beaver_ftc.diagnosis.monitors.rotation import components, down
+from beaver_ftc.diagnosis.monitors.rotation import components, down, vector
 from beaver_ftc.plant.instruments import PHI
 
 GYRO_OPEN, GYRO_CONFIRMED, GYRO_REFUTED = 0, 1, 2  # verdicts of a gyro
@@ -83,7 +83,7 @@ def advance_gyro_estimate(mon, nu, eta, dt):
     innovation of the frame, and the bound on it that the declared uncertainty gives.
     """
     w, B = mon.w, mon.w_bound
-    w0, B0 = np.copy(w), np.copy(B)
+    w0, B0 = components(vector(w)), components(vector(B))
     for i in range(3):
         w[i] = dt * nu[i]
         B[i] = dt * eta[i]

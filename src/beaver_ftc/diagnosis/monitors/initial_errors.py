@@ -70,7 +70,7 @@ y_past: those of the sample before. Letters of the kernels that fill H and C:
 
 import numpy as np
 
-from beaver_ftc.compiled import kernel, record
+from beaver_ftc.compiled import copy, kernel, record
 from beaver_ftc.design.engine import SEA_LEVEL_DENSITY_KG_M3
 from beaver_ftc.diagnosis.detection.filters import leak
 from beaver_ftc.diagnosis.monitors.numbering import (
@@ -203,7 +203,7 @@ def start_bounds(mon, y):
         angle = abs(y[INITIAL_SENSOR[h]]) + MAX_FLOW_ANGLE_RAD
         E[h] = 2.0 * np.sin(0.5 * min(angle, np.pi))
     E[H_PHI] = E[H_THETA] = MAX_CHORD
-    mon.initial.E_start[:] = E
+    copy(E, mon.initial.E_start)
 
 
 @kernel

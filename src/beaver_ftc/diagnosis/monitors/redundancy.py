@@ -27,7 +27,7 @@ the bounds of flow and climb by the effect of its gusts within a filter's memory
 
 import numpy as np
 
-from beaver_ftc.compiled import kernel
+from beaver_ftc.compiled import copy, kernel
 from beaver_ftc.design import LEAST_HEIGHT_M
 from beaver_ftc.diagnosis.detection.filters import advance_bound, leak
 from beaver_ftc.diagnosis.monitors.numbering import (
@@ -147,10 +147,10 @@ def bound_readings(mon, y):
 @kernel
 def store_sample(mon, y, force):
     """Take y and the specific force (3,) m/s2 as the sample before, for the next one."""
-    mon.y_older[:] = mon.y_past
-    mon.y_past[:] = y
-    mon.e_older[:] = mon.e_past
-    mon.e_past[:] = mon.e
+    mon.y_older = mon.y_past
+    copy(y, mon.y_past)
+    mon.e_older = mon.e_past
+    mon.e_past = mon.e
     mon.a[:] = combined(1.0, vector(force), mon.g, down(y))
 
 
@@ -448,7 +448,7 @@ def start_tests(mon, y, force):
     bound_readings(mon, y)
     store_sample(mon, y, force)
     store_sample(mon, y, force)  # twice: y_older and e_older are those of this sample, too
-    mon.a_past[:] = mon.a
+    mon.a_past = mon.a
     mon.a_size[:2] = length(mon.a) + FORCE_JUMP_M_S2
     mon.e_first = AB_PAST * FORCE_JUMP_M_S2
     bound_residuals(mon, y)

@@ -152,7 +152,7 @@ def isolate_sensor(mon, measured, verdict, bank, bound, dt, t):
     if o.top_ratio > 1.0 and not o.alarmed:
         raise_alarm(mon, verdict, t)
         o.alarm_test = o.worst_test_index
-        mon.initial.E_alarm[:] = mon.initial.E
+        mon.initial.E_alarm = mon.initial.E
     if o.alarmed:
         filter_beyond(mon, measured.signal)
         if mon.substep == 0 and mon.stage == FULL_STAGE:

@@ -239,7 +239,7 @@ def update_gusts(stat, du, pred, meas, k, dt):
     if not meas.inertial:
         forces.drop_forces(force, gust, vaneless, vaned)
     if force.in_use or gust.output.uses_accelerometers:
-        gust.memory.f_read[:] = meas.force
+        gust.memory.f_read = meas.force
     if force.in_use:
         update_forces(stat.rows, force, gust, du, meas, pred.u, dt)
         if vaneless.output.gusty:
@@ -253,7 +253,7 @@ def update_gusts(stat, du, pred, meas, k, dt):
 def step_view_gust(gust, y, pred, meas, k, dt):
     """Update a gust estimate by accelerometers that the views alone use, once a frame; y (5,) with its flow
     angles."""
-    gust.memory.f_read[:] = meas.force
+    gust.memory.f_read = meas.force
     gusts.set_intensity(gust, meas.altitude)
     gusts.step_gust(gust, y, meas.attitude, dt, k)
     gusts.fill_gust_effect(gust, pred.design, meas.x, y, pred.u)

@@ -121,5 +121,5 @@ def update_verdict(fdi, prediction, measured, t):
     net = fdi.published.network
     fdae_residual(fdi.fdae, measured.x)
     evaluate_state_network(net, fdi.layout.main, measured.x, measured.y, prediction.u)
-    fdi.fdae.network.output[:] = net.output
+    fdi.fdae.network.output = net.output
     adaptive_estimators.follow_alarm(fdi, measured, fdae_axis(fdi.fdae), t)

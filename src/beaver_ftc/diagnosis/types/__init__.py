@@ -51,7 +51,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from beaver_ftc.compiled import kernel, record
+from beaver_ftc.compiled import copy, kernel, record
 from beaver_ftc.diagnosis import estimators
 from beaver_ftc.diagnosis.sets import EMPTY_SET, UNLIMITED_SET, intersect
 
@@ -259,7 +259,7 @@ OBSERVATION_RECORD = record(u=float, lo=float, hi=float, anomalous=int, kappa=fl
 def copy_observation(new, old):
     """Copy the observation `old` into `new`."""
     (new.u, new.lo, new.hi, new.anomalous, new.kappa) = (old.u, old.lo, old.hi, old.anomalous, old.kappa)
-    new.hides[:] = old.hides
+    copy(old.hides, new.hides)
 
 
 @kernel

@@ -21,7 +21,7 @@ types: of `fault_types_dtype`. est: the estimators of the isolation; the layout 
 
 import numpy as np
 
-from beaver_ftc.compiled import kernel
+from beaver_ftc.compiled import copy, kernel
 from beaver_ftc.diagnosis import estimators, isolation
 from beaver_ftc.diagnosis.types import (
     GIVE_UP,
@@ -75,7 +75,7 @@ def record_commands(types, commands, ext):
         stored = srf.commands
         if types.block.n_so_far == 0:
             for b in range(N_KEPT - 1, 0, -1):
-                stored.history[b, :n] = stored.history[b - 1, :n]
+                copy(stored.history[b - 1, :n], stored.history[b, :n])
                 for ends in (stored.cmd_min, stored.cmd_max):
                     ends[b] = ends[b - 1]
             for ends in (stored.u_min, stored.u_max):
@@ -188,7 +188,7 @@ def extend_block(types, layout, est, nu, bound):
     share = 1.0 / c.frames_per_block
     if block.n_so_far == 0:
         block.nu[:] = block.nu_bound[:] = 0.0
-        block.n_start[:] = bound.n_old
+        block.n_start = bound.n_old
     for j in layout.position:
         isolation.add_to_mean(est[j].mean_effect, est[j].effect, share, block.n_so_far == 0)
     block.n_so_far += 1
@@ -196,7 +196,8 @@ def extend_block(types, layout, est, nu, bound):
         block.nu[i] += share * nu[i]
         block.nu_bound[i] += share * bound.eta_bar[i]
     if block.n_so_far == c.frames_per_block:
-        block.nu_bound[:] += (block.n_start + bound.n_gyro) / c.block_duration_s
+        for i in range(3):
+            block.nu_bound[i] += (block.n_start[i] + bound.n_gyro[i]) / c.block_duration_s
         block.n_so_far = 0
         observe_surfaces(types, layout, est, block.nu, block.nu_bound)
         judge_frame(types)

@@ -29,7 +29,7 @@ Other symbols: verdict.py, types/__init__.py.
 
 import numpy as np
 
-from beaver_ftc.compiled import kernel
+from beaver_ftc.compiled import copy, kernel
 from beaver_ftc.diagnosis.detection.filters import leaves_bound
 from beaver_ftc.diagnosis.state import LATERAL_GROUP, PITCH, PITCH_GROUP, ROLL, UNANTICIPATED, YAW
 from beaver_ftc.diagnosis.types import (
@@ -183,9 +183,10 @@ def store_first(types, s):
     pair.n_unstored = pair.n_unstored + 1 if newly_excluded else 0
     if pair.first_pitch != s or pair.n_unstored >= types.config.half_frames:
         pair.first_pitch, pair.n_unstored = s, 0
-        stored.low[:], stored.high[:] = srf.sets.low, srf.sets.high
+        stored.low = srf.sets.low
+        stored.high = srf.sets.high
         stored.excluded[:] = 1
-        stored.excluded[:N_CONSTANT] = srf.sets.excluded[:N_CONSTANT]
+        copy(srf.sets.excluded[:N_CONSTANT], stored.excluded[:N_CONSTANT])
 
 
 @kernel
@@ -206,9 +207,9 @@ def begin_second_if_shown(types, layout):
     srf1, srf2 = types.surface[s1], types.surface[layout.partner[s1]]
     if can_be_faulty(srf1) and constant_remains(srf1):
         return
-    srf1.sets.low[:] = srf1.first_sets.low
-    srf1.sets.high[:] = srf1.first_sets.high
-    srf1.sets.excluded[:] = srf1.first_sets.excluded
+    srf1.sets.low = srf1.first_sets.low
+    srf1.sets.high = srf1.first_sets.high
+    srf1.sets.excluded = srf1.first_sets.excluded
     examination.restart_surface(srf2)
     for srf in (srf1, srf2):
         srf.status.may_be_sole, srf.status.basis = 0, verdict.DEDUCED_FAULTY

@@ -284,7 +284,9 @@ def move_surfaces(pred, command):
 @kernel
 def move_healthy(pred):
     """Move the healthy surfaces, and the ends between which they are, by one JSBSim frame."""
-    pred.u_old[:], pred.u_lo_old[:], pred.u_hi_old[:] = pred.u, pred.u_lo, pred.u_hi
+    copy(pred.u, pred.u_old)
+    copy(pred.u_lo, pred.u_lo_old)
+    copy(pred.u_hi, pred.u_hi_old)
     move(pred.actuators, pred.commanded, pred.u)
     if pred.actuators.uncertain:
         move_ends(pred.actuators, pred.commanded, pred.u_lo, pred.u_hi)

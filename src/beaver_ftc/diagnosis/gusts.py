@@ -133,9 +133,9 @@ def fill_force(gust, x, y, u, f):
 def fill_rotation(phi, th, T):
     """Fill T (3, 3), the rotation from level axes (forward, right, down) to body axes; angles rad."""
     s_phi, c_phi, s_th, c_th = np.sin(phi), np.cos(phi), np.sin(th), np.cos(th)
-    T[0, :] = c_th, 0.0, -s_th
-    T[1, :] = s_phi * s_th, c_phi, s_phi * c_th
-    T[2, :] = c_phi * s_th, -s_phi, c_phi * c_th
+    T[0, 0], T[0, 1], T[0, 2] = c_th, 0.0, -s_th
+    T[1, 0], T[1, 1], T[1, 2] = s_phi * s_th, c_phi, s_phi * c_th
+    T[2, 0], T[2, 1], T[2, 2] = c_phi * s_th, -s_phi, c_phi * c_th
 
 
 @kernel

@@ -16,7 +16,7 @@ from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document
 from beaver_ftc_logs import physics
 from beaver_ftc_logs.known_commands import command_names, missing_commands_text
-from beaver_ftc_logs.known_quantities import NAME_PATTERNS, find_quantities, likely_columns, plain_form
+from beaver_ftc_logs.known_quantities import TIME_PATTERN, find_quantities, likely_columns, plain_form
 from beaver_ftc_logs.mixing import Mixing, mixing_of_log
 from beaver_ftc_logs.readers import (
     SELECTIVE_READERS,
@@ -183,7 +183,7 @@ def _find_time(path: Path) -> TimeSource | None:
     If several units fit, the one at the end of the column's name is taken, otherwise the first in TIME_UNITS.
     """
     names = column_names(path)
-    time_names = [name for name in names if re.fullmatch(NAME_PATTERNS["time"], plain_form(name))]
+    time_names = [name for name in names if re.fullmatch(TIME_PATTERN, plain_form(name))]
     phrases: list[str] = []
     for name in sorted(time_names, key=lambda name: name != TIME_COLUMN):
         cells = first_cells_of_column(path, name)

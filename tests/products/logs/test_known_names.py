@@ -60,28 +60,26 @@ def test_a_multicopter_is_called_one(parameters, names, said):
 
 
 @pytest.mark.parametrize("names", [
-    "t_s; P (deg/s); Q (deg/s); R (deg/s); Aileron Command (norm); Phi (deg)",
+    "t; P (deg/s); Q (deg/s); R (deg/s); Aileron Command (norm); Phi (deg)",
     "_real,_time; ____P,rad/s; ____Q,rad/s; ____R,rad/s; ailrn,yoke1; _roll,__deg",
     "Time [ms]; gyroADC[0]; gyroADC[1]; gyroADC[2]; servo[3]; roll_deg",
     "time (ms); s.gyro_rad[0]; s.gyro_rad[1]; s.gyro_rad[2]; da; phi_deg",
     "t_ms; attitude.rollspeed; attitude.pitchspeed; attitude.yawspeed; aileron; phi_deg",
     "Time / ms; Gyro x [rad/s]; Gyro y [rad/s]; Gyro z [rad/s]; aileron; phi_deg",
     "Timestamp [ms]; roll rate [rad/s]; pitch rate [rad/s]; yaw rate [rad/s]; aileron; phi_deg",
-    "t_s; ang_vel_x; ang_vel_y; ang_vel_z; aileron; phi_deg",
+    "time; ang_vel_x; ang_vel_y; ang_vel_z; aileron; phi_deg",
 ])  # fmt: skip
 def test_tables_of_known_programs_are_recognised_with_their_units(tmp_path, names):
+    """The throttle stands first and increases as a time does, but its name is none of a time."""
     time, *rates, command, roll = names = names.split("; ")
     in_deg, in_ms = any(name in rates[0] for name in ("deg/s", "ADC", "ang_vel")), "ms" in time
     size = 180.0 / np.pi if in_deg else 1.0
-    columns = [T_S * (1e3 if in_ms else 1.0), *(size * rate for rate in RATES), KINEMATIC["roll_cmd"],
+    columns = [T_S, T_S * (1e3 if in_ms else 1.0), *(size * rate for rate in RATES), KINEMATIC["roll_cmd"],
                np.rad2deg(KINEMATIC["roll_rad"])]  # fmt: skip
     rows = ["|".join(f"{cell:.9g}" for cell in row) for row in zip(*columns, strict=True)]
-    (tmp_path / "a.csv").write_text("\n".join(["|".join(names), *rows]) + "\n")
+    (tmp_path / "a.csv").write_text("\n".join(["throttle|" + "|".join(names), *rows]) + "\n")
     vehicle = check_log(tmp_path / "a.csv", None, None)["vehicle"]
-    assert vehicle.get("time", {"column": time, "unit": "s"}) == {
-        "column": time,
-        "unit": "ms" if in_ms else "s",
-    }
+    assert vehicle["time"] == {"column": time, "unit": "ms" if in_ms else "s"}
     units = [entry["unit"] if isinstance(entry, dict) else "rad/s" for entry in vehicle["rates"].values()]
     assert units == ["deg/s" if in_deg else "rad/s"] * 3
     assert [*vehicle["surfaces"].values()] == [{command: 1.0}]

@@ -16,7 +16,6 @@ from beaver_ftc.results import Document
 from beaver_ftc_logs.mixing_ardupilot import ardupilot_mixing
 from beaver_ftc_logs.mixing_parts import Axes, CheckedParameters, Outputs, Surface, Weights, tidy
 from beaver_ftc_logs.mixing_px4 import px4_mixing
-from beaver_ftc_logs.readers import SELECTIVE_READERS
 from beaver_ftc_logs.recording import Floats, Parameters
 
 # The outputs of both follow the aileron command with the same sign, and the flap command with opposite signs.
@@ -44,18 +43,20 @@ class Mixing:
 
 def mixing_of_log(reader: str, params: Parameters, column_names: Collection[str]) -> Mixing:
     """The mixing by the parameters of a log, with commands out of these columns. It has no surfaces if the
-    parameters give none, or if the log has none of their commands. outputs: the ways in which the outputs can
-    be logged; n_logged: for each way, the number of surfaces whose output is in the log.
+    parameters give none, if the log has none of their commands, or if no autopilot wrote the log.
     """
     mixing = Mixing()
     names = set(column_names)
-    if reader not in SELECTIVE_READERS:
-        return mixing
     read = CheckedParameters(params, mixing.lines)
-    surfaces, outputs, axes = ardupilot_mixing(read) if reader == "ardupilot" else px4_mixing(read, names)
+    if reader == "ardupilot":
+        surfaces, outputs, axes = ardupilot_mixing(read)
+    elif reader == "ulog":
+        surfaces, outputs, axes = px4_mixing(read, names)
+    else:
+        return mixing
     if surfaces:
-        # The surfaces follow their outputs if the log has those of at least as many surfaces as follow the
-        # axes.
+        # There are several ways to log the outputs; the one that has the outputs of most surfaces is used.
+        # The surfaces follow these outputs if no fewer surfaces have one than can follow the axes.
         n_logged = [sum(column in names for column, _ in columns) for columns in outputs]
         n_by_output = max(n_logged)
         if n_by_output and n_by_output >= sum(not axes.problem_of(surface, names) for surface in surfaces):
@@ -74,16 +75,17 @@ def _add_surfaces_by_output(
     """Add each surface with the command of its own output.
 
     If the shares of roll, pitch and yaw in a command are a linear combination of those in earlier commands,
-    the command is not used: its surface follows the same combination of the earlier commands, since a fit
-    cannot distinguish commands that move together. basis: positions of the commands that are used.
+    its surface follows the same combination of the earlier ones, since a fit cannot distinguish commands that
+    move together. The command itself is then used only for a flaperon (`_weights_of_own_columns`). basis:
+    positions of the independent commands.
     """
-    pairs = [*zip(all_surfaces, outputs, strict=True)]
-    for surface, (column, _) in pairs:
-        if column not in names:
+    used = []
+    for surface, (column, reading) in zip(all_surfaces, outputs, strict=True):
+        if column in names:
+            used.append((surface, column, reading))
+        else:
             mixing.lines.append(surface.stays_out(f"{column} is not in the log"))
-    used = [(surface, *output) for surface, output in pairs if output[0] in names]
-    surfaces = [surface for surface, *_ in used]
-    columns = [column for _, column, _ in used]
+    surfaces, columns, _ = zip(*used, strict=True)
     rows = _rows_of_commands(surfaces)
     own_weights = _weights_of_own_columns(surfaces)
     basis: list[int] = []

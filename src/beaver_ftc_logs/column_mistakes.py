@@ -2,16 +2,23 @@
 
 A large residual may come from a fault, from the air, or from such a mistake. There are three tests:
 
-1. All rates, or a command, move much more or less than in the flights of the model (`refuse_rate_unit`,
-   `refuse_command_unit`).
+1. All rates move much more or less than in the flights of the model (`refuse_rate_unit`). In a fit: a
+   command moves much more or less than in the first flight (`refuse_command_unit`).
 2. The gain of a command is opposite to that of the model, or as small or large as its motion is large or
    small (`_command_mistakes`).
-3. The log is likelier with one mistake corrected (`mistake_gains`).
+3. The log has a higher score with one mistake corrected (`mistake_gains`).
 
 A mistake is there from the first sample to the last, so tests 2 and 3 must find it in each of four parts.
 
     lo, hi          lowest lower and highest upper bound of a group's gain over the parts, 1 in the model
-    ll              log likelihood of a sample (4,), a mean over each part
+    R, ma           covariance and moving average of the noise, as in `regression`
+    q               variance of the residual of each part over R (4,), after least squares (`noise_scale`)
+    ll              score of each part (4,), used as the mean log likelihood of a sample:
+
+    ll = -log det(R)^1/2 + 3 log sum(ma) - 1.5 log q
+
+It is no likelihood, since q comes from a median, on which faults of few samples have hardly an effect. The
+log likelihood, at its maximum over trim, gains and variance, has the mean square instead.
 """
 
 from collections.abc import Sequence
@@ -39,26 +46,28 @@ _UNIT_FACTOR_ROOT = 1.6
 _MAX_ALIKE_FACTOR = 3.0
 # Another unit changes a motion by this factor at least.
 _MIN_UNIT_FACTOR = 12.0
+_ONE_UNIT = "one unit (57.3 is deg for rad, 100 percent: `unit`, `scale`)"
 # The text of each kind of mistake. group: its name; motion: over that in the flights of the model.
 _COMMAND_MISTAKES = {
     "sign": "the rates answer the command of {group} the other way round in all of it "
     "(does `scale: -1` fit?)",
     "weak": "the command of {group} moves {motion:.3g} times as much as in the flights of the model, and "
-    "does at most {gain:.2g} of what it did: one unit (57.3 is deg for rad, 100 percent: `unit`, `scale`)",
+    "does at most {gain:.2g} of what it did: " + _ONE_UNIT,
     "strong": "the command of {group} moves {motion:.3g} times as much as in the flights of the model, and "
-    "does at least {gain:.3g} times what it did: one unit (57.3 is deg for rad, 100 percent: `unit`, "
-    "`scale`)",
+    "does at least {gain:.3g} times what it did: " + _ONE_UNIT,
 }
-# Below this gain a command has the opposite effect. Of 576 correct logs with faults of any kind, the least
-# gain was 0.98, in light turbulence 0.93 (`own_logs.py`, seeds 31 to 42; 71 to 201).
+# A command whose upper bound on the gain is below this has the opposite effect. In 576 correct logs with
+# faults of any kind, the least of these bounds was 0.98, in light turbulence 0.93 (`own_logs.py`, seeds 31 to
+# 42; 71 to 201).
 MAX_REVERSED_GAIN = -0.3
-# Below this gain a command has hardly any effect (same logs).
+# A command whose upper bound is below this has hardly any effect (same logs).
 _MIN_COMMAND_GAIN = 0.2
 # Half-way from the gain of a wrong sign, -1, to that of a lost surface, 0.
 _REVERSED_GAIN_LIMIT = -0.5
-# Largest probability that a correct log seems to have a mistake in its columns.
+# Largest probability that a correct log seems to have a mistake in its columns, if the scores were
+# likelihoods.
 _FALSE_MISTAKE_CHANCE = 0.001
-# A flight is reduced to less than twice this number of samples, to save computing time.
+# A flight of at least twice as many samples is reduced, to no fewer than these, to save computing time.
 _MAX_COMPARED_SAMPLES = 8000
 
 
@@ -101,14 +110,14 @@ def refuse_command_unit(flight: Samples, first: Samples, surfaces: Sequence[str]
         if allowed < ratio < 1e4 or (alike and 1e-4 < ratio < 1.0 / _MIN_UNIT_FACTOR):
             raise BadInput(
                 f"{flight.name}: the command of {surface} moves {ratio:.3g} times as much as in the other "
-                f"flights, the rates {rate_ratios.max():.2g} times at most, allowed: one unit (57.3 is deg "
-                "for rad, 100 percent: `unit`, `scale`)"
+                f"flights, the rates {rate_ratios.max():.2g} times at most, allowed: {_ONE_UNIT}"
             )
 
 
-def _relative_motion(values: Floats, fitted: Sequence[Sequence[float]]) -> Floats:
-    """Central range of each column of values (n, S) over that in the flights of the model, (S,)."""
-    spans = [np.ptp(np.array(ranges).reshape(-1, 2), axis=1) for ranges in (central_ranges(values), fitted)]
+def _relative_motion(values: Floats, reference: Sequence[Sequence[float]]) -> Floats:
+    """Width of the central range of each column of values (n, S) over that of the reference ranges, (S,)."""
+    ranges = central_ranges(values), reference
+    spans = [np.ptp(np.array(pairs).reshape(-1, 2), axis=1) for pairs in ranges]
     return spans[0] / np.maximum(spans[1], MIN_DIVISOR)
 
 
@@ -120,33 +129,32 @@ CommandMistakes = dict[tuple[str, str], tuple[float, float]]
 class Answers(NamedTuple):
     """The response to the commands in each of four parts of a flight.
 
-    lower, upper (4, G): bounds of the gain of each group, 1 in the model. likelihood (4,): mean log
-    likelihood of a sample, without a constant. n_white: number of white samples that have the information of
-    the shortest part.
+    lower, upper (4, G): bounds of the gain of each group, 1 in the model. score (4,): ll. n_white: number of
+    white samples that have the information of the shortest part.
     """
 
     lower: Floats
     upper: Floats
-    likelihood: Floats
+    score: Floats
     n_white: float
 
 
-def answers(samples: Samples, model: Model, max_samples: float = np.inf) -> Answers | None:
+def answers(samples: Samples, model: Model, least_samples: float = np.inf) -> Answers | None:
     """The responses in the parts of a flight; None if a part is too short.
 
-    max_samples: half of the largest number of samples to use. Of a longer flight, only every `step`-th is
-    used.
+    least_samples: if a flight has at least twice as many, only every `step`-th is used, so that no fewer than
+    these remain.
     """
     flight = regression.innovations(samples, model)
     rows = np.flatnonzero(flight.is_known)
-    step = max(int(len(rows) // max_samples), 1)
+    step = max(int(len(rows) // least_samples), 1)
     if (parts := regression.split_parts(rows[::step])) is None:
         return None
     share = model.settings.power / flight.noise.wider
     bounds = [flight.at(part).gain_bounds(share) for part in parts]
-    lower, upper, scales = (np.array(values) for values in zip(*bounds, strict=True))
-    likelihood = -flight.log_size - 1.5 * np.log(scales)
-    return Answers(lower, upper, likelihood, share * min(map(len, parts)))
+    lower, upper, q = (np.array(values) for values in zip(*bounds, strict=True))
+    ll = -flight.log_size - 1.5 * np.log(q)
+    return Answers(lower, upper, ll, share * min(map(len, parts)))
 
 
 def refuse_columns(samples: Samples, model: Model) -> None:
@@ -156,8 +164,8 @@ def refuse_columns(samples: Samples, model: Model) -> None:
     """
     if not any(known_effects(model)):
         return
-    flight, likeliest = _whiten_likeliest(samples, model)
-    measured = answers(flight, likeliest)
+    flight, own_model = _whiten_best(samples, model)
+    measured = answers(flight, own_model)
     if measured is None:
         return
     mistakes = _lasting_mistakes(samples, model, measured)
@@ -165,7 +173,7 @@ def refuse_columns(samples: Samples, model: Model) -> None:
         _COMMAND_MISTAKES[kind].format(group=group, motion=motion, gain=gain)
         for (kind, group), (motion, gain) in mistakes.items()
     ]
-    text = texts[0] if texts else _likelier_mistake(flight, likeliest)
+    text = texts[0] if texts else _likelier_mistake(flight, own_model)
     if text is not None:
         allowed = "allowed: columns, signs and units as in the flights of the model"
         raise BadInput(f"{samples.name}: {text}, {allowed}")
@@ -173,28 +181,28 @@ def refuse_columns(samples: Samples, model: Model) -> None:
 
 def _lasting_mistakes(samples: Samples, model: Model, measured: Answers) -> CommandMistakes:
     """The mistakes by `_command_mistakes` that remain if the flight is whitened by any other moving average
-    that makes it likelier. A law's response to gusts or to gyro noise can look like a command with the
+    that increases its score. A law's response to gusts or to gyro noise can look like a command with the
     opposite effect."""
     mistakes = _command_mistakes(samples, model, measured)
     if not mistakes:
         return mistakes
     for ma in NOISE_MA_CANDIDATES:
-        likelier = answers(whiten_samples(samples, ma), model)
-        if likelier is not None and likelier.likelihood.mean() > measured.likelihood.mean():
-            again = _command_mistakes(samples, model, likelier)
+        trial = answers(whiten_samples(samples, ma), model)
+        if trial is not None and trial.score.mean() > measured.score.mean():
+            again = _command_mistakes(samples, model, trial)
             mistakes = {key: sizes for key, sizes in mistakes.items() if key in again}
     return mistakes
 
 
-def _whiten_likeliest(samples: Samples, model: Model) -> tuple[Samples, Model]:
-    """The flight whitened by the noise model that makes it likeliest, and the model with this noise alone."""
-    return max(regression.by_noise(samples, model), key=lambda pair: _likelihoods(*pair).mean())
+def _whiten_best(samples: Samples, model: Model) -> tuple[Samples, Model]:
+    """The flight whitened by the noise model with the highest score, and the model with this noise alone."""
+    return max(regression.by_noise(samples, model), key=lambda pair: _scores(*pair).mean())
 
 
 def find_reversed(samples: Samples, model: Model) -> list[list[str]]:
     """The groups of known effect whose gain in the whole flight, by least squares, is nearer to -1 (another
     sign) than to 0 (a lost surface)."""
-    flight = regression.innovations(*_whiten_likeliest(samples, model))
+    flight = regression.innovations(*_whiten_best(samples, model))
     rows = np.flatnonzero(flight.is_known)
     if regression.split_parts(rows) is None:
         return []
@@ -231,12 +239,12 @@ def _command_mistakes(samples: Samples, model: Model, measured: Answers) -> Comm
 
 
 def _likelier_mistake(samples: Samples, model: Model) -> str | None:
-    """The text of the correction that makes the flight likeliest; None if none makes every part decisively
-    likelier.
+    """The text of the correction with the largest gain; None if no gain is decisive.
 
-    If the model is correct, a wrong correction makes the log K times as likely with a probability of at most
-    1 / K (Markov's inequality). With N corrections, K = N / _FALSE_MISTAKE_CHANCE. A part is K times as
-    likely if gain n > log K, with n white samples in it.
+    The limit is that of a likelihood ratio. If the model is correct, a wrong correction makes the log K times
+    as likely with a probability of at most 1 / K (Markov's inequality). With N corrections,
+    K = N / _FALSE_MISTAKE_CHANCE. A part counts as K times as likely if gain n > log K, with n white samples
+    in it. The scores are no likelihoods, so this probability is not ensured.
     """
     gains, n = mistake_gains(samples, model)
     if not gains:
@@ -249,31 +257,31 @@ def _likelier_mistake(samples: Samples, model: Model) -> str | None:
 
 
 def mistake_gains(samples: Samples, model: Model) -> tuple[dict[str, float], float]:
-    """For each correction of the columns, the gain of the log likelihood of a sample, in the part of the
-    flight with the least gain; and the number of white samples that a part counts as.
+    """For each correction of the columns, the gain of the score, in the part of the flight with the least
+    gain; and the number of white samples that a part counts as.
 
-    A corrected signal must also be likelier than no signal: its gain is at most the gain over a log without
-    the signal, in the sum over the parts. Where the model errs in the effect of a signal, a smaller or
-    reversed effect may be likelier than the modelled one, and no effect likelier still.
+    A corrected signal must also have a higher score than no signal: its gain is at most the gain over a log
+    without the signal, in the sum over the parts. Where the model errs in the effect of a signal, a smaller
+    or reversed effect may score higher than the modelled one, and no effect higher still.
     """
     measured = answers(samples, model, _MAX_COMPARED_SAMPLES)
     if measured is None:
         return {}, 0.0
     without = {
-        signal: _likelihoods(altered_log(samples, model.vehicle, {}, {signal: 0.0}), model)
+        signal: _scores(altered_log(samples, model.vehicle, {}, {signal: 0.0}), model)
         for signal in model.vehicle.signal_columns
     }
     gains = {}
     for log in corrected_logs(samples, model.vehicle, unknown_surfaces(model)):
-        ll = _likelihoods(log.samples, model) + log.log_jacobian
-        gain = float((ll - measured.likelihood).min())
+        ll = _scores(log.samples, model) + log.log_jacobian
+        gain = float((ll - measured.score).min())
         if signal := log.scaled_signal:
             gain = min(gain, float((ll - without[signal]).sum()))
         gains[log.correction_text] = gain
     return gains, measured.n_white
 
 
-def _likelihoods(samples: Samples, model: Model) -> Floats:
-    """Log likelihood of a sample of each part of the flight; minus infinity where a part is too short."""
+def _scores(samples: Samples, model: Model) -> Floats:
+    """The score of each part of the flight, (4,); one minus infinity for all if a part is too short."""
     measured = answers(samples, model, _MAX_COMPARED_SAMPLES)
-    return np.array(-np.inf) if measured is None else measured.likelihood
+    return np.array(-np.inf) if measured is None else measured.score

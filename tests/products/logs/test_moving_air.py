@@ -93,7 +93,7 @@ def test_columns_are_compared_in_white(moving, colour):
     flight = flown(colour, 1.1, 4000, 21)
     column_mistakes.refuse_columns(flight, moving)
     found = [column_mistakes.answers(whiten_samples(flight, one.average), moving) for one in moving.colours]
-    likeliest = max(found, key=lambda one: one.likelihood.mean())
+    likeliest = max(found, key=lambda one: one.score.mean())
     assert all(1.0 < gain < 1.6 for gain in likeliest.upper.max(axis=0))
     plain = column_mistakes.answers(flight, moving.model_copy(update={"colours": []}))
     assert colour == (1.0,) or min(plain.upper.max(axis=0)) > 1.9  # what coloured noise does to the fit

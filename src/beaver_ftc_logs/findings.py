@@ -12,7 +12,7 @@ from beaver_ftc_logs.energy import ENGINE, UNKNOWN_SURFACE
 from beaver_ftc_logs.isolability import isolability_document, isolability_sentences
 from beaver_ftc_logs.log_rows import LogRows
 from beaver_ftc_logs.model import Model
-from beaver_ftc_logs.runs import Runs, constant_stretches
+from beaver_ftc_logs.runs import Runs, constant_runs
 from beaver_ftc_logs.samples import Samples
 
 MAX_BRIEF_EVENT_S = 3.0  # a shorter alarm is brief
@@ -56,7 +56,7 @@ def fault_events(rows: LogRows, surfaces: list[str]) -> list[Document]:
     _, index = np.unique(rows.isolated_surfaces.astype(str), return_inverse=True)
     columns = np.column_stack([index, rows.faulty, rows.faulty[:, None] * rows.effectiveness])
     runs: Runs = []
-    for begin, end in constant_stretches(columns):
+    for begin, end in constant_runs(columns):
         if runs and _joins(rows, runs[-1], (begin, end)):
             runs[-1] = (runs[-1][0], end)
         else:

@@ -25,7 +25,7 @@ from beaver_ftc_logs.groups import group_surfaces
 from beaver_ftc_logs.model import Model, NoiseModel
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats, Ints, Mask
 from beaver_ftc_logs.regression import FitPart, Parts
-from beaver_ftc_logs.runs import constant_stretches
+from beaver_ftc_logs.runs import constant_runs
 from beaver_ftc_logs.samples import Samples
 from beaver_ftc_logs.vehicle import Vehicle
 
@@ -69,7 +69,7 @@ def usable_mask(samples: Samples) -> Mask:
         return usable
     labels = samples.labels[:, labelled]
     usable &= np.isfinite(labels).all(axis=1)
-    for begin, end in constant_stretches(labels):
+    for begin, end in constant_runs(labels):
         short = (end - begin) * samples.dt_s < MIN_LABEL_S
         n = round(LABEL_MARGIN_S / samples.dt_s)
         usable[begin : end if short else begin + n] = False

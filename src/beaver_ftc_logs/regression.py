@@ -61,9 +61,8 @@ class FitPart:
         rows = np.flatnonzero(self.is_usable)
         middle = int(rows[len(rows) // 2]) if len(rows) else 0
         is_first = np.arange(len(self.is_usable)) < middle
-        first = self.is_usable & is_first
-        second = self.is_usable & ~is_first
-        return FitPart(self.samples, first), FitPart(self.samples, second)
+        first = FitPart(self.samples, self.is_usable & is_first)
+        return first, FitPart(self.samples, self.is_usable & ~is_first)
 
     def innovations(self, model: Model) -> "Innovations":
         """The innovations of the usable samples by a model. Commands are multiplied by the labelled
@@ -84,7 +83,8 @@ def build_regressors(
     samples: Samples, groups: Groups, h: int, L: int, labelled: bool, f: int
 ) -> tuple[Floats, Floats, Mask]:
     """The regressors of each sample: the past X (n, 3 h + D f) and the commands U (n, G, L) of the groups;
-    and known (n,), whether rates and regressors are finite and no gap in the log lies between them.
+    and known (n,), whether rates and regressors are finite and no gap in the log lies within the last
+    max(h, L) samples.
 
     labelled: as in `group_commands`.
     """
@@ -109,9 +109,11 @@ class Innovations:
     """The part of a flight's rates that the past does not explain, one row for each sample: y = c + sum_g F_g
     + e in health.
 
-    rows (n,): place of each row in the flight. is_known (n,): whether the whole past of the row is known; if
-    not, its row of e is 0. y (n, 3), F (n, G, 3), c (3,) rad/s: as in the head of this file, less the part
-    that earlier residuals predict (`subtract_noise`). noise: noise model of the flight.
+    rows (n,): place of each row in the flight. is_known (n,): whether the whole past of the row is known. If
+    not, its row of e is 0, and its rows of y and F are finite but have no meaning: select the known rows with
+    `at` before `regression`, `gain_bounds` or `gains`. y (n, 3), F (n, G, 3), c (3,) rad/s: as in the head of
+    this file, less the part that earlier residuals predict (`subtract_noise`). noise: noise model of the
+    flight.
     """
 
     rows: Ints
@@ -194,7 +196,8 @@ class Innovations:
 
             sum over g of |(F_g - mean of F_g over the last _QUICK_SPAN_S) W|^2 / 3
 
-        The quick part is the difference of a response from its mean.
+        The quick part is the difference of a response from its mean. The mean includes rows that are not
+        known.
         """
         sums, counts = trailing_sums(self.F, _QUICK_SPAN_S * rate_hz)
         quick = (self.F - sums / counts[:, None, None]) @ self.W
@@ -232,10 +235,8 @@ def innovations(samples: Samples, model: Model, labelled: bool = False) -> Innov
     is_known = known.copy()  # a row that is not known makes the p next ones unknown: `ar` uses it for them
     for lag in range(1, len(ar) + 1):
         is_known &= _delay_rows(known, lag, False)
-    y = np.nan_to_num(y)
-    F = np.nan_to_num(F)
     c = c - c @ ar.sum(axis=0)
-    return Innovations(np.arange(len(y)), is_known, y, F, c, noise)
+    return Innovations(np.arange(len(y)), is_known, np.nan_to_num(y), np.nan_to_num(F), c, noise)
 
 
 def by_noise(samples: Samples, model: Model) -> list[tuple[Samples, Model]]:

@@ -36,7 +36,7 @@ def true_runs(mask: Mask) -> Runs:
     return [(begin, end) for begin, end in edges.tolist()]
 
 
-def constant_stretches(values: Floats) -> Runs:
+def constant_runs(values: Floats) -> Runs:
     """The runs of equal rows of values (n, k). NaN is equal to NaN: it is read as -1."""
     known = np.nan_to_num(values, nan=-1.0)
     return runs_between(np.any(np.diff(known, axis=0) != 0.0, axis=1))
@@ -44,7 +44,8 @@ def constant_stretches(values: Floats) -> Runs:
 
 def trailing_sums(x: NDArray[Any], n: float) -> tuple[Floats, Ints]:
     """For each row the sum of x (k, ...) over the last n rows, itself included, and the number of these rows,
-    (k,): n rounded, fewer at the begin, and at least one."""
+    (k,): n rounded, fewer at the start, and at least one. x is finite: since the sums are differences of one
+    cumulative sum, a NaN makes all later ones NaN."""
     end = np.arange(1, len(x) + 1)
     begin = np.maximum(end - max(round(n), 1), 0)
     sums = np.concatenate([np.zeros((1, *x.shape[1:])), np.cumsum(x, axis=0)])

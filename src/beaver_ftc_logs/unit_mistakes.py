@@ -15,10 +15,9 @@ from beaver_ftc_logs.physics import CIRCLE_SLACK, AngleFit, fit_angle
 from beaver_ftc_logs.recording import Column, Columns, largest_magnitude
 from beaver_ftc_logs.units import ACCELERATION, ANGLE, RATE, SI_UNITS, UNIT_FACTORS, nearest_unit
 
-# Magnitudes of the correlation of an angle's change with the integral of a rate:
+# Magnitudes of the correlation of an angle's change with the integral of a rate (`_replacing_correlation`):
 _EXCHANGED = 0.2  # below this the rate is that of another axis
 _AGREEING = 0.7  # above this the two belong together, whatever the unit of the rate
-# From _AGREEING to this, another column replaces the rate only if its correlation is above _EXACT
 _CLOSE = 0.95
 _EXACT = 0.99  # above this the angle confirms the rate, if the slope is within _UNIT_RATIO of 1
 # Slopes between its inverse and itself show no other unit: no two units differ by so little
@@ -48,8 +47,8 @@ def _mistakes_of_axis(
 ) -> Iterator[str]:
     """Yield the texts of mistakes in one rate and its angle, the surest first:
 
-    1. the size of a pitch angle, 2. another column follows the angle, 3. the slope, 4. another unit of the
-    rate.
+    1. the size of a pitch angle, 2. another column follows the angle, 3. the slope, if the correlation of
+    rate and angle is at least _AGREEING, 4. otherwise another unit of the rate.
     """
     angle = angles[axis]
     rate = [*named][axis]
@@ -121,9 +120,10 @@ def _factor_remark(fit: AngleFit, named_rate: NamedColumn, named_angle: NamedCol
     """Text of a mistake in a rate or its angle by the slope, with the factor that fits; None if there is
     none.
 
-    A slope near -1 is a wrong sign. Otherwise either may be wrong: the angle if it exceeds a full circle;
-    else the rate if no vehicle turns so fast; else the text offers both. There is no text if they hardly
-    correlate.
+    A slope near -1 is a wrong sign. Otherwise either may be wrong. The text names the angle if it exceeds a
+    full circle and a unit fits; else the rate if no vehicle turns so fast and a unit fits; else both. Its
+    factors are magnitudes: if the slope, which the text shows, is negative, the sign is wrong too. There is
+    no text if rate and angle hardly correlate.
     """
     slope = abs(fit.slope)
     is_near_one = 1.0 / _SLOPE_FACTOR < slope < _SLOPE_FACTOR
@@ -156,7 +156,10 @@ def _pitch_remark(name: str, pitch: Column) -> str | None:
         return None
     unit = next((u for u in ("deg", "cdeg") if largest * SI_UNITS[u][1] <= _MAX_PITCH_RAD), None)
     hint = f"it {_unit_text(unit)}" if unit else "no unit fits"
-    return f"{name} reaches {largest:.4g} rad, a pitch angle at most 1.571: {hint}; look at the rates' too"
+    return (
+        f"{name} reaches {largest:.4g} rad, a pitch angle at most {0.5 * np.pi:.4g}: {hint}; look at the "
+        "rates' too"
+    )
 
 
 def gravity_remark(az: Column, name: str) -> str | None:
@@ -166,6 +169,6 @@ def gravity_remark(az: Column, name: str) -> str | None:
     median = float(np.median(np.abs(known))) if known.size else 0.0
     if _GRAVITIES_G[0] < median / GRAVITY_MPS2 < _GRAVITIES_G[1]:
         return None
-    unit = nearest_unit(ACCELERATION, GRAVITY_MPS2 / median, 2.0) if median > 0.0 else None
+    unit = nearest_unit(ACCELERATION, GRAVITY_MPS2 / median, _GRAVITIES_G[1]) if median > 0.0 else None
     hint = f"it {_unit_text(unit)}" if unit else "no unit fits: is 1 g in it?"
     return f"{name}: its median magnitude is {median:.4g} m/s2, 1 g is {GRAVITY_MPS2:.4g}: {hint}"

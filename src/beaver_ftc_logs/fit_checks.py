@@ -1,4 +1,4 @@
-"""Figures of a fit beside its quality: collinear regressors, and the colour of the residual."""
+"""Checks of a fit: collinear regressors, and the autocorrelation of the residual."""
 
 from math import isfinite
 
@@ -15,9 +15,9 @@ LEAST_INFLATION = 10.0
 _BANDS_HZ = ((0.0, 0.1), (0.1, 0.5), (0.5, 1.0), (1.0, 2.0), (2.0, 5.0), (5.0, 10.0))
 
 
-def collinear_names(parts: Parts, model: Model) -> list[Document]:
+def collinear_regressors(parts: Parts, model: Model) -> list[Document]:
     """Regressors whose coefficient's variance the others inflate more than tenfold, worst first. The
-    inflation of a regressor is None where the others determine it."""
+    inflation of a regressor is None where the others determine it, or where it is constant."""
     Z, _, _ = orders.stack_data(parts, model.vehicle, model.history, model.lags)
     factors = variance_inflation(Z[:, 1:]).tolist()
     named = zip(factors, regressor_names(model), strict=True)
@@ -29,7 +29,8 @@ def collinear_names(parts: Parts, model: Model) -> list[Document]:
 
 
 def regressor_names(model: Model) -> list[str]:
-    """Names of the columns of the fit after the constant, in their order."""
+    """Names of the columns of the fit after the constant, in their order: past rates, past signals, and the
+    commands of each group; [-k]: k samples before."""
     h = model.history
     signals = model.vehicle.regressor_columns
     commands = [(f"command of {'+'.join(group)}",) for group in model.groups]
@@ -42,7 +43,8 @@ def regressor_names(model: Model) -> list[str]:
 
 
 def median_inflation(parts: Parts, model: Model) -> dict[str, float]:
-    """By how much the residual's colour widens the standard errors of the responses: the median by axis."""
+    """Median factor by which the autocorrelation of the residual enlarges the standard errors of the
+    responses, by axis."""
     # The responses are the last rows, `lags` of each group.
     inflation = orders.fit_of(parts, model).standard_error_inflation[-len(model.groups) * model.lags :]
     return regression.by_axis(np.median(inflation, axis=0))

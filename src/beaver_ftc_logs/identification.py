@@ -8,7 +8,7 @@ from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document
 from beaver_ftc_logs import extremes, fitting, gyro_noise, orders, regression, validation
 from beaver_ftc_logs.column_mistakes import refuse_command_unit
-from beaver_ftc_logs.fit_checks import collinear_names, density_ratios, median_inflation
+from beaver_ftc_logs.fit_checks import collinear_regressors, density_ratios, median_inflation
 from beaver_ftc_logs.folds import fold_qualities
 from beaver_ftc_logs.free_runs import fit_output_error
 from beaver_ftc_logs.groups import group_indices
@@ -46,7 +46,7 @@ def identify(flights: Sequence[Samples], vehicle: Vehicle) -> Model:
         ],
         "tests": folds,
         "another_day": expect_another_day(folds, model),
-        "collinear": collinear_names(parts, model),
+        "collinear": collinear_regressors(parts, model),
         "colour": median_inflation(parts, model),
         "spectrum": density_ratios(parts, model),
         "output_error": fit_output_error(parts, group_indices(model)),

@@ -1,4 +1,5 @@
-"""Tables, page and figure of the benchmark on recorded flights, from its document (`benchmark`)."""
+"""Tables, page and figure of the benchmark on recorded flights, from its document (`benchmark`); tables and
+page of the other days made of them (`other_days`)."""
 
 from collections.abc import Callable
 from operator import itemgetter
@@ -11,7 +12,7 @@ from beaver_ftc.results import SERIES_COLOURS as SERIES
 from beaver_ftc.results import Document, as_json
 from beaver_ftc.studies.present import GRID, Files, aligned, markdown_table, marker, panels, replace_between
 from beaver_ftc_logs.energy import ENGINE
-from beaver_ftc_logs.recorded.benchmark import LABEL_TITLES, SURFACE_KINDS
+from beaver_ftc_logs.recorded.benchmark import LABEL_TITLES
 
 # A table: the headers of its columns, and the cells of each row.
 HeaderAndRows = tuple[list[str], list[list[str]]]
@@ -60,13 +61,13 @@ def _tables_of_other_days(document: Document) -> list[tuple[str, HeaderAndRows]]
 
 
 def _share(key: str) -> Cell:
-    """Cells of a score with three digits; empty if its authors did not publish it."""
+    """Cells of a score with three digits; empty if the row does not have it."""
     return lambda row: "" if row.get(key) is None else f"{row[key]:.3f}"
 
 
 def _delay(kind: str) -> Cell:
-    """Cells of the mean delay for a kind of surface, with the numbers of failures that were found and of
-    all."""
+    """Cells of the mean delay, s, for a kind of surface, with the numbers of failures that were found and of
+    all if both are known. Without a delay: `not found` if there were failures, otherwise empty."""
 
     def cell_of(row: Document) -> str:
         delay = row["delay_s"].get(kind, {})
@@ -85,8 +86,8 @@ def _ours(text_of: Cell) -> Cell:
 
 
 def _soon_text(row: Document) -> str:
-    """How many failures of ailerons and rudders (SURFACE_KINDS[:2]) were found within 5 s, of all of them."""
-    delays = [row["delay_s"][kind] for kind in SURFACE_KINDS[:2]]
+    """How many failures of ailerons and rudders were found within 5 s, of all of them."""
+    delays = [row["delay_s"][kind] for kind in ("aileron", "rudder")]
     return " of ".join(str(sum(delay[key] for delay in delays)) for key in ("within_5_s", "failures"))
 
 
@@ -157,7 +158,7 @@ def _method_titles(data: Document) -> list[str]:
     """The methods of a panel. For published methods only scores are known, not the delay on each failure, so
     a panel of delays leaves them out.
     """
-    published = data.get("published", ()) if data["scored_by"] == "labels" else ()
+    published = data["published"] if data["scored_by"] == "labels" else ()
     return [row["method"] for row in (*data["rows"], *published)]
 
 
@@ -166,8 +167,8 @@ def _draw_failure_delays(axis: Any, data: Document) -> None:
     right has the failures that were not found within _SHOWN_DELAY_S.
     """
     titles = _method_titles(data)
-    failed = {entry["left_out"]: entry["failure"] for entry in data["flights"]}
-    failures = [failure for failure in dict.fromkeys(failed.values()) if failure and ENGINE not in failure]
+    distinct = dict.fromkeys(entry["failure"] for entry in data["flights"])
+    failures = [failure for failure in distinct if failure and ENGINE not in failure]
     for i, failure in enumerate(failures):
         shift = 0.7 * ((i + 0.5) / len(failures) - 0.5)
         entries = [row for row in data["flights"] if row["failure"] == failure and row["method"] in titles]

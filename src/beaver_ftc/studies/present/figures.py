@@ -13,8 +13,8 @@ if TYPE_CHECKING:
 
 DPI = 110
 DASHES: tuple[Any, ...] = ("-", (0, (5, 2)), (0, (2, 2)), (0, (6, 2, 1, 2)), (0, (1, 1)))
-MARKS = "os^DXPv<>*h"  # eleven markers and eight colours: 88 curves differ in at least one of the two
-GRID = "#dddddd"
+MARKS = "os^DXPv<>*h"  # eleven, and eight colours: 88 curves with `marker` differ in at least one of the two
+GRID = "#dddddd"  # colour of grid lines and of hatched cells
 
 
 def panels(
@@ -42,7 +42,7 @@ def label_edges(grid: Any, x: str | None = None, y: Sequence[str] = (), titles: 
 
 
 def curve_look(place: int) -> dict[str, Any]:
-    """Colour and dashes of the curve at a place among several."""
+    """Colour and dashes of the curve at a place among several: 40 curves differ in one or both."""
     return {"color": SERIES[place % len(SERIES)], "linestyle": DASHES[place % len(DASHES)]}
 
 

@@ -1,11 +1,10 @@
 """The published cases with the scheme and law of the paper, and with our default ones, side by side.
 
-Flights, declarations and references are the same; only scheme and law differ.
+Flights, declared bounds and references are the same. Ours also sets `fdi.thresholds` and `fdi.sharpen`.
 """
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
 
 from beaver_ftc.results.model import Document
 from beaver_ftc.studies.present.tables import number
@@ -15,21 +14,11 @@ SHOWN = (HEALTHY, *(CASES[name] for name in ("elevator", "aileron", "rudder", "u
 WHOSE: Mapping[str, Mapping[str, object]] = {"paper": {}, "ours": OURS}
 BETTER = "Where the paper's is better, by more than 1 %:"
 MATTERS = 0.01  # a difference by a smaller share does not count
-
-
-class Quantity(NamedTuple):
-    """A number whose smaller value is better: key in a row, name, unit."""
-
-    key: str
-    called: str
-    unit: str
-
-
+# Numbers whose smaller value is better: key in a row, name, unit.
 QUANTITIES = (
-    Quantity("detected_s", "detection after", "s"), Quantity("isolated_s", "isolation after", "s"),
-    Quantity("before_deg_s", "RMS before the fault", "deg/s"),
-    Quantity("after_deg_s", "RMS after the fault", "deg/s"),
-    Quantity("travel_deg", "surface travel", "deg"), Quantity("work_deg2_per_s", "surface work", "deg²/s"),
+    ("detected_s", "detection after", "s"), ("isolated_s", "isolation after", "s"),
+    ("before_deg_s", "RMS before the fault", "deg/s"), ("after_deg_s", "RMS after the fault", "deg/s"),
+    ("travel_deg", "surface travel", "deg"), ("work_deg2_per_s", "surface work", "deg²/s"),
 )  # fmt: skip
 
 
@@ -89,21 +78,21 @@ def _row(case: str, whose: str, flight: Flown) -> Document:
 
 
 def _better(rows: Sequence[Document]) -> list[Document]:
-    """The numbers that are better with the scheme and law of the paper, unless this flight loses the
-    aircraft."""
+    """The numbers that are better with the scheme and law of the paper, unless the aircraft is lost with
+    these."""
     # `fly_both` has each case with the paper's scheme first, then with ours
     pairs = zip(rows[::2], rows[1::2], strict=True)
     return [
         {
             "case": paper["case"],
-            "quantity": q.called,
-            "unit": q.unit,
-            "paper": paper[q.key],
-            "ours": ours[q.key],
+            "quantity": name,
+            "unit": unit,
+            "paper": paper[key],
+            "ours": ours[key],
         }
         for paper, ours in pairs
-        for q in QUANTITIES
-        if not paper["departed"] and _less(paper[q.key], ours[q.key])
+        for key, name, unit in QUANTITIES
+        if not paper["departed"] and _less(paper[key], ours[key])
     ]
 
 

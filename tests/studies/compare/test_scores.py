@@ -9,12 +9,10 @@ from beaver_ftc.studies.compare.scores import (
     better_than_ours,
     line_of,
     matched,
-    point_at,
     trade_off,
     who_is_better,
 )
 from beaver_ftc.studies.compare.trial import LAW, SCHEME, STATISTICAL, Entry, Result
-from beaver_ftc.studies.engine.statistics import share_within
 
 ENTRY = Entry("a", "b")
 
@@ -49,12 +47,9 @@ def test_nothing_to_count_is_not_zero():
     line = line_of(ENTRY, [_result(faulted=False, fault_free_s=0.0)], [_result()])
     assert line["detection_rate"] is None
     assert line["false_alarms_per_h"] is None
-
-
-def test_quantiles_count_what_never_came_as_last():
-    assert share_within([3.0, 1.0, inf, 2.0], 0.5) == 2.0
-    assert share_within([3.0, 1.0, inf, 2.0], 0.9) == inf
-    assert share_within([], 0.5) == inf
+    assert line_of(ENTRY, [_result(error="no")], [_result()])["us"] == inf
+    (point,) = trade_off([Trace(0.0, (), faulted=False, healthy_s=0.0)])
+    assert (point["detection_rate"], point["false_alarms_per_h"], matched([point])) == (None, None, None)
 
 
 def _traces():
@@ -69,16 +64,12 @@ def _traces():
 def test_a_lower_level_buys_delay_with_false_alarms():
     points = trade_off(_traces())
     assert [point["level"] for point in points] == [1.0, 0.7, 0.6, 0.5, 0.2, 0.1]
-    assert [p["false_alarms_per_h"] for p in points] == pytest.approx([0, 0, 0.5, 1.0, 1.5, 2.0], abs=0.5)
     rates = [point["false_alarms_per_h"] for point in points]
     assert rates == sorted(rates)
     assert points[0]["detection_rate"] == 0.5
     assert points[1]["detection_rate"] == 1.0
-
-
-def test_the_matched_level_is_the_most_sensitive_one_allowed():
-    assert matched(trade_off(_traces()))["level"] == 0.7
-    assert point_at(_traces(), 0.1)["detection_rate"] == 1.0  # of the one flight without an earlier alarm
+    assert points[-1]["detection_rate"] == 1.0  # of the one flight without an earlier alarm
+    assert matched(points)["level"] == 0.7
 
 
 def test_flights_without_a_number_on_either_side_give_no_ratio():

@@ -153,8 +153,9 @@ def _draw_curves(rate: "Axes", delay: "Axes", part: Document) -> None:
         for axis, key in ((rate, "detection_rate"), (delay, "delay_median_s")):
             values = [float("nan") if point[key] is None else point[key] for point in points]
             axis.plot(alarms, values, label=scheme, drawstyle="steps-post", **look)
-            if shipped[key] is not None:
-                axis.plot(shipped["false_alarms_per_h"], shipped[key], marker(index), color=look["color"])
+            point = shipped["false_alarms_per_h"], shipped[key]
+            if None not in point:
+                axis.plot(*point, marker(index), color=look["color"])
     for axis, label in ((rate, "detection rate"), (delay, "median detection delay, s")):
         axis.set(xlabel="false alarms per hour", ylabel=label)
         axis.set_xscale("symlog", linthresh=10.0)

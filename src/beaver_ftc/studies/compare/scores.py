@@ -6,7 +6,6 @@ from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from math import inf
 from operator import itemgetter
-from statistics import median as middle
 
 from beaver_ftc.results.metrics import versions
 from beaver_ftc.results.model import Document
@@ -28,8 +27,8 @@ Results = Sequence[Result]  # of one entry, in the order of the flights
 
 def line_of(entry: Entry, results: Results, oracle: Results, ours: Results = ()) -> Document:
     """The line of one entry over one set. oracle: results of the oracle in the same flights, in the same
-    order. ours: the same of our entry, if it flew. Flights that failed with an error are only in `failed`.
-    ratio: tracking error over that of the oracle, where the oracle has one.
+    order. ours: the same of our entry, or nothing to compare with. Flights that failed with an error are only
+    in `failed`. ratio: tracking error over that of the oracle, where the oracle has one.
 
     The delay of an event that never comes is infinite, and so is a quantile of nothing. None: a rate in no
     flight.
@@ -49,7 +48,7 @@ def line_of(entry: Entry, results: Results, oracle: Results, ours: Results = ())
         "detected": sum(r.delay_s < inf for r in faulted),
         "isolated": sum(r.correct for r in faulted),
         "departures": sum(r.departed for r in completed),
-        "us": middle(r.us for r in completed) if completed else 0.0,
+        "us": share_within([r.us for r in completed], 0.5),
         **_spread("before", [r.before_deg_s for r in completed]),
         **_spread("after", [r.after_deg_s for r in faulted]),
         "travel_median": share_within([r.travel_deg_s for r in completed], 0.5),
@@ -129,24 +128,22 @@ def trade_off(traces: Sequence[Trace]) -> list[Document]:
 def point_at(traces: Sequence[Trace], level: float) -> Document:
     """False alarms and detections of a scheme at a level of its statistic.
 
-    Detections and delays are counted in the flights without a false alarm before the fault.
+    Detections and delays are counted in the flights without a false alarm before the fault. None: a rate in
+    no flight, or in no time.
     """
     alarms, hours = alarms_at(traces, level)
     delays = [trace.delay_s(level) for trace in traces if trace.faulted and not trace.false_alarm(level)]
-    detection_rate = sum(delay < inf for delay in delays) / len(delays) if delays else 0.0
-    per_h = alarms / hours if hours else 0.0
-    median_s = share_within(delays, 0.5)
     return {
         "level": level,
-        "false_alarms_per_h": per_h,
-        "detection_rate": detection_rate,
-        "delay_median_s": median_s,
+        "false_alarms_per_h": alarms / hours if hours else None,
+        "detection_rate": sum(delay < inf for delay in delays) / len(delays) if delays else None,
+        "delay_median_s": share_within(delays, 0.5),
     }
 
 
-def matched(points: Sequence[Document]) -> Document:
-    """The most sensitive level without a false alarm."""
-    return min((p for p in points if p["false_alarms_per_h"] <= 0.0), key=itemgetter("level"))
+def matched(points: Sequence[Document]) -> Document | None:
+    """The most sensitive level without a false alarm; None if no alarm could have been false."""
+    return min((p for p in points if p["false_alarms_per_h"] == 0.0), key=itemgetter("level"), default=None)
 
 
 # The keys of a line in which `better_than_ours` compares rivals with ours, and their names.
@@ -175,7 +172,8 @@ SIGNIFICANT = 0.05
 
 
 def document_of(trials: Sequence[Trial], entries: Sequence[Entry]) -> Document:
-    """Tally every set; numbers that do not exist are null."""
+    """Tally every set; numbers that do not exist are null. entries: among them our scheme with our law, and
+    with the oracle."""
     names = list(dict.fromkeys(trial.set for trial in trials))
     sets = {name: _set_document([t for t in trials if t.set == name], entries) for name in names}
     return {"sets": sets, "versions": dict(versions())}
@@ -193,7 +191,7 @@ def _set_document(trials: Sequence[Trial], entries: Sequence[Entry]) -> Document
         s: [all_finite(point) for point in trade_off(points_of_scheme)]
         for s, points_of_scheme in traces.items()
     }
-    without_false_alarm = {s: matched(points_of_scheme) for s, points_of_scheme in points.items()}
+    without_false_alarm = {s: point for s in points if (point := matched(points[s]))}
     failed = {result.error for trial in trials for result in trial.results if result.error}
     return {
         "flights": len(trials),
@@ -201,9 +199,7 @@ def _set_document(trials: Sequence[Trial], entries: Sequence[Entry]) -> Document
         "trade_off": points,
         "without_false_alarm": without_false_alarm,
         "who_is_better": who_is_better(lines),
-        "better_than_ours": better_than_ours(
-            lines, without_false_alarm if any(line["faults"] for line in lines) else {}
-        ),
+        "better_than_ours": better_than_ours(lines, without_false_alarm),
         "errors": sorted({error for trial in trials for error in trial.failures} | failed),
     }
 
@@ -242,8 +238,8 @@ def leader(
     """One sentence that compares the best rival with ours, each number with its interval. If their numbers
     are equal, it names all rivals that equal ours.
 
-    rows: our line and those of the rivals by name, each with the duel `against_ours`. ours: our name. key: of
-    the number; the keys `<key>_low` and `<key>_high` are its interval. title: its name. cell: its format.
+    rows: our line and those of the rivals, by name, each with the duel `against_ours`. ours: our name. key:
+    of the number; the keys `<key>_low` and `<key>_high` are its interval. title: its name. cell: its format.
     """
     sign = -1.0 if more_is_better else 1.0
     badness = {name: inf if row.get(key) is None else sign * row[key] for name, row in rows.items()}
@@ -275,8 +271,11 @@ def _with_interval(row: Document, key: str, cell: Callable[[float], str]) -> str
 
 
 def better_than_ours(lines: Sequence[Document], free: Document) -> list[str]:
-    """One sentence for each number in which a rival is better than ours. free: by scheme, the point at its
-    most sensitive level without a false alarm."""
+    """One sentence for each number in which a rival is better than ours.
+
+    lines: among them that of our entry. free: by scheme, the point at its most sensitive level without a
+    false alarm, if there is one.
+    """
     schemes, laws = competitors(lines)
     ours = schemes[SCHEME]
     sentences = [s for name, row in schemes.items() for s in _better(row, ours, COMPARED | TRACKING, name)]

@@ -7,10 +7,8 @@ from hypothesis import strategies as st
 
 from beaver_ftc.studies.mismatch.bound import (
     guarantee_with,
-    recommend,
     recommended_for,
     rounded_up,
-    settle,
     split_flight,
     with_bound,
 )
@@ -49,12 +47,13 @@ def test_a_fault_is_no_uncertainty():
     assert found["exceeded_times"] == 0
 
 
-def test_stays_above_the_bound_are_timed():
+def test_stays_above_the_bound_are_timed_and_name_their_source():
     eta = np.array([0, 0.04, 0.05, 0.04, 0, 0, 0.06, 0, 0, 0.04])
-    found = flight_of(np.arange(10) / 10, eta).bound(0)
+    found = flight_of(np.arange(10) / 10, eta, source="engine").bound(0)
     stays = [(stay["start_s"], stay["end_s"]) for stay in found["exceedances"]]
     assert np.ravel(stays) == pytest.approx([0.1, 0.4, 0.6, 0.7, 0.9, 1.0])
     peak = found["exceedances"][0]
+    assert peak["source"] == "engine"
     keys = ("peak_ratio", "peak_s", "airspeed_mps", "altitude_m", "alpha_rad")
     assert [peak[key] for key in keys] == pytest.approx([0.05 / 0.03, 0.2, 45.05, 1000.05, 0.15])
     assert (found["exceeded_s"], found["exceeded_times"]) == (pytest.approx(0.5), 3)
@@ -66,11 +65,6 @@ def test_nothing_is_no_share_of_a_bound_of_nothing():
     assert found.exceeded
     assert found.bound(0)["worst_ratio"] is None
     assert not flight_of([0.0], [0.01]).exceeded
-
-
-def test_a_stay_names_its_source():
-    found = flight_of([0.0], [0.05], source="engine").bound(0)
-    assert found["exceedances"][0]["source"] == "engine"
 
 
 def test_a_bound_of_zero_is_exceeded_most():
@@ -119,29 +113,22 @@ def test_a_larger_bound_guarantees_the_published_case_later_or_never():
     )
 
 
-def test_the_recommended_bound_covers_the_flight_it_makes():
-    """With the published bound a wrong mass alarms and another law flies on; without, it needs more."""
-    case = scenario(design_model={"mass": 1.1}, faults=[loss(at_s=6)], duration_s=12)
-    kept, flown = split_flight(case)
-    assert flown.false_alarm
-    constant, settled = settle([case], [kept.smallest_constant])
-    assert settled
-    again, flown_with_it = split_flight(with_bound(case, constant))
-    assert not again.exceeded
-    assert not flown_with_it.false_alarm
-
-
-def test_no_bound_is_recommended_under_which_a_flight_then_raises_a_false_alarm():
-    """A calm flight needs little; the published case, flown with as little, would alarm before its fault."""
-    calm = scenario(duration_s=6, uncertainty={})
-    kept, _ = split_flight(calm)
-    needed = recommend([kept.smallest_constant])
-    assert guarantee_with(needed, calm)["false_alarm"]
-    found = recommended_for([calm], [kept.smallest_constant])
+@pytest.mark.parametrize(
+    "flown",
+    [
+        # needs little; the published case, with as little, would alarm
+        {"duration_s": 6, "uncertainty": {}},
+        # alarms with the declared bound, after which another law flies
+        {"design_model": {"mass": 1.1}, "faults": [loss(at_s=6)], "duration_s": 12},
+    ],
+)
+def test_the_recommended_bound_covers_the_flight_that_it_makes_and_the_published_case(flown):
+    case = scenario(**flown)
+    found = recommended_for([case], [split_flight(case)[0].smallest_constant])
     assert found["guarantee"]["recommended"]["false_alarm"] is False
     assert found["recommended"]["settled"]
     assert found["recommended"]["runs"] == 1
-    assert found["recommended"]["coverage"] == 1 / 2
-    again, flown = split_flight(with_bound(calm, found["recommended"]["constant_rad_s2"]))
+    assert found["recommended"]["coverage"] == 0.0  # a second flight may be the worst on each of three axes
+    again, metrics = split_flight(with_bound(case, found["recommended"]["constant_rad_s2"]))
     assert not again.exceeded
-    assert not flown.false_alarm
+    assert not metrics.false_alarm

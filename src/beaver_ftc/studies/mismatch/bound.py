@@ -30,18 +30,17 @@ def recommend(needed: Sequence[np.ndarray], at_least: PerAxis | None = None) -> 
 
 
 def widened(constant_rad_s2: PerAxis) -> PerAxis:
-    """The bound times 1.2, at least LEAST_RAD_S2 and rounded up, for alarms without an exceeded bound, which
-    rounding and noise may cause."""
+    """The bound of all axes times 1.2, at least LEAST_RAD_S2 and rounded up: for flights that exceed the
+    bound or have a false alarm although they need no larger one, which rounding and noise may cause."""
     return {axis: rounded_up(max(1.2 * c, LEAST_RAD_S2)) for axis, c in constant_rad_s2.items()}
 
 
 def rounded_up(value: float) -> float:
-    """The next number of two significant digits that is not below `value`."""
+    """The smallest number of two significant digits that is not below `value` by more than a part in 1e9."""
     if value <= 0.0:
         return 0.0
     step = 1 - floor(log10(value))
-    scaled = value * 10.0**step
-    return ceil(scaled - 1e-9 * scaled) / 10.0**step if step >= 0 else ceil(scaled) * 10.0**-step
+    return float(f"{ceil((1.0 - 1e-9) * value * 10.0**step)}e{-step}")
 
 
 def guarantee_with(constant_rad_s2: PerAxis, like: Scenario) -> Document:
@@ -79,8 +78,8 @@ def recommended_for(scenarios: Sequence[Scenario], needed: Sequence[np.ndarray])
     published case is covered, too: with a bound for calmer air alone, it would have a false alarm and
     guarantee nothing.
 
-    coverage: probability that one more run of the same kind stays within the bound, runs / (runs + 1), since
-    each of runs + 1 runs is equally likely to be the worst.
+    coverage: probability, at least, that one more run of the same kind stays within the bound of all axes,
+    1 - 3 / (runs + 1) or 0: on each axis, each of runs + 1 runs is equally likely to be the worst.
     """
     first = scenarios[0]
     runs = len(scenarios)
@@ -89,7 +88,8 @@ def recommended_for(scenarios: Sequence[Scenario], needed: Sequence[np.ndarray])
     constant, settled = settle([*scenarios, case], [*needed, split_flight(case)[0].smallest_constant])
     return {
         "recommended": {
-            "constant_rad_s2": constant, "runs": runs, "coverage": runs / (runs + 1), "settled": settled,
+            "constant_rad_s2": constant, "runs": runs, "settled": settled,
+            "coverage": max(1.0 - len(AXES) / (runs + 1), 0.0),
         },
         "guarantee": {
             "declared": guarantee_with(declared, first), "recommended": guarantee_with(constant, first),

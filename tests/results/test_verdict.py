@@ -42,11 +42,8 @@ def test_markup_in_a_name_is_no_markup():
     ],
 )
 def test_the_title_and_the_mood(changes, title, outcome_class):
-    document = flown(**changes)
-    assert (verdict.title(Metrics.of(document)), verdict.outcome_class(Metrics.of(document))) == (
-        f"a-flight: {title}",
-        outcome_class,
-    )
+    metrics = Metrics.of(flown(**changes))
+    assert (verdict.title(metrics), verdict.outcome_class(metrics)) == (f"a-flight: {title}", outcome_class)
 
 
 def test_an_axis_about_which_no_surface_acts_has_lost_nothing():
@@ -56,6 +53,16 @@ def test_an_axis_about_which_no_surface_acts_has_lost_nothing():
     authority["r"] = of | dict.fromkeys(names, 0.0)
     said = dict(verdict.verdict_lines(Metrics.of(flown(authority=authority))))
     assert said["remaining"] == "roll authority 50 % (-1 to 2 rad/s2)"
+
+
+def test_a_size_that_grows_is_not_compared_at_an_unknown_time():
+    fault = {"actuator": "rudder", "type": "loss_of_effectiveness", "at_s": 1.0, "profile": "incipient"}
+    named = {"isolated": True, "fault": "rudder", "type": fault["type"], "estimate": -0.5, "correct": True}
+    metrics = Metrics.of(flown(faults=[fault | {"size": {"magnitude": 0.5}}], isolation=named))
+    assert (
+        dict(verdict.verdict_lines(metrics))["isolation"]
+        == "rudder; correct, loss of effectiveness, estimated loss 50 %"
+    )
 
 
 def test_an_alarm_does_not_hide_where_nothing_could_be_concluded():

@@ -1,14 +1,14 @@
 """The verdict of a flight in words, for the terminal and the head of the report.
 
 All words are computed from the metrics, so that they cannot disagree with metrics.json. A line of the verdict
-is a pair (name, text); a function returns an empty text if there is nothing to say, and the line is left out.
+is a pair (name, text); without a text, it is left out.
 """
 
 import io
 import math
+import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from beaver_ftc.results.expectations import (
@@ -45,6 +45,7 @@ if TYPE_CHECKING:
 MIN_SHOWN_BEYOND_S = 0.1  # a shorter time without sufficient authority is not printed
 MAX_SHOWN_AUTHORITY_SHARE = 0.995  # an axis with a larger share has lost nothing worth saying
 MAX_LISTED_CANDIDATES = 4  # more surfaces are counted, not listed
+_TIME = re.compile("(?<!_deg|_rad)_s$")  # names of fields in seconds, without rates
 _ASSUMPTION_TEXT = {"sensors-sound": "sensors are sound (A11)"}
 Lines = Iterable[tuple[str, str]]  # name and text
 # Candidates that are no surface, in words.
@@ -60,7 +61,8 @@ _AIRCRAFT_PART_OF_SURFACE_WORD = {
 
 
 def title(metrics: Metrics) -> str:
-    """The name of the scenario, whether its expectations are met, and whether the aircraft was lost."""
+    """The name of the scenario, whether its expectations are met or the flight was interrupted, and whether
+    the aircraft was lost."""
     lost = ", the aircraft was LOST" if metrics.departure else ""
     if metrics.interrupted_s is not None:
         return f"{metrics.scenario}: INTERRUPTED at {metrics.interrupted_s:.2f} s, not passed{lost}"
@@ -80,7 +82,7 @@ def verdict_lines(metrics: Metrics) -> list[tuple[str, str]]:
     isolation = metrics.isolation
     lines = (
         ("flight", _if_there(_condition_text, metrics.flight)),
-        *(("" if i else "fault", _fault_text(fault, metrics.faults)) for i, fault in enumerate(declared)),
+        *headed("fault", [_fault_text(fault, metrics.faults) for fault in declared]),
         ("assumed", ", ".join(_ASSUMPTION_TEXT.get(name, name) for name in metrics.assumes)),
         ("outside", _outside_class_text(metrics)),
         ("detection", _detection_text(metrics)),
@@ -94,15 +96,10 @@ def verdict_lines(metrics: Metrics) -> list[tuple[str, str]]:
             ("", _found_text(fault, metrics, _candidates_text(fault.candidates)))
             for fault in (isolation.faults[1:] if isolation.isolated else ())
         ),
-        *(
-            ("" if i else "windows", _window_text(window, metrics))
-            for i, window in enumerate(metrics.windows or ())
-        ),
+        *headed("windows", [_window_text(window, metrics) for window in metrics.windows or ()]),
         (
             "probing",
-            _if_there(
-                lambda span_s: f"flap and elevator moved from {_span_text(*span_s)}", isolation.probing_s
-            ),
+            f"flap and elevator moved from {_span_text(*isolation.probing_s)}" if isolation.probing_s else "",
         ),
         ("supervisor", _supervisor_text(metrics)),
         *(("changed", _change_text(change)) for change in metrics.changes),
@@ -127,18 +124,23 @@ def verdict_lines(metrics: Metrics) -> list[tuple[str, str]]:
     return [(name, text) for name, text in lines if text]
 
 
+def headed(name: str, texts: Sequence[str]) -> list[tuple[str, str]]:
+    """A line for each text; only the first has the name."""
+    return [("" if i else name, text) for i, text in enumerate(texts)]
+
+
 def _if_there(text_of: Callable[[Any], str], section: Any) -> str:
     """The text of a section; empty if the flight has no such section."""
     return text_of(section) if section else ""
 
 
 def _filled(form: str, section: Part | None, **more: str) -> str:
-    """A form filled with the fields of a section and of `more`; a field that ends in `_s` is written as a
-    time. Empty if the flight has no such section."""
+    """A form filled with the fields of a section and of `more`; a field in seconds is written as a time.
+    Empty if the flight has no such section."""
     if section is None:
         return ""
     values = {
-        name: _seconds_text(value) if name.endswith("_s") else value for name, value in vars(section).items()
+        name: _seconds_text(value) if _TIME.search(name) else value for name, value in vars(section).items()
     }
     return form.format(**values, **more)
 
@@ -209,13 +211,15 @@ def verdict_text(metrics: Metrics, folder: str, colour: bool = False) -> str:
     """The verdict of one flight as a table for the terminal."""
     style = {"good": "bold green", "lost": "bold yellow", "bad": "bold red"}[outcome_class(metrics)]
     lines = verdict_lines(metrics)
-    for i, (when, p, q, r) in enumerate(tracking_rms_in_words(metrics)):
-        lines.append(("" if i else "tracking RMS", f"p {p}  q {q}  r {r} deg/s {when} the fault"))
+    errors = [
+        f"p {p}  q {q}  r {r} deg/s {when} the fault" for when, p, q, r in tracking_rms_in_words(metrics)
+    ]
+    lines += headed("tracking RMS", errors)
     expectations = [
         (expectation.passed, expectation.sentence) for expectation in expectations_in_words(metrics)
     ]
-    certificate = _if_there(partial(_certificate_text, folder), metrics.certificate)
-    last_lines = [("certificate", certificate)] if certificate else []
+    written = metrics.certificate
+    last_lines = [("certificate", _certificate_text(folder, written))] if written else []
     table = verdict_table((title(metrics), style), lines, expectations, [*last_lines, ("results", folder)])
     return f"{printed([table], colour=colour)}\n"
 
@@ -279,8 +283,11 @@ def _change_text(change: ChangeInFlight) -> str:
 def _condition_text(condition: FlightCondition) -> str:
     """Airspeed, altitude, time, scheme and law."""
     of_every_type = ", every fault type" if condition.fault_class == "all" else ""
-    form = "{airspeed_mps:g} m/s at {altitude_m:g} m, {flown_s}; diagnosis {scheme}{of_every_type}; law {law}"
-    return _filled(form, condition, of_every_type=of_every_type)
+    return _filled(
+        "{airspeed_mps:g} m/s at {altitude_m:g} m, {flown_s}; diagnosis {scheme}{of_every_type}; law {law}",
+        condition,
+        of_every_type=of_every_type,
+    )
 
 
 def _outside_class_text(metrics: Metrics) -> str:
@@ -361,10 +368,12 @@ def _protection_limit_text(limit: ProtectionLimit) -> str:
 
 
 def _true_size_text(isolation: Named, metrics: Metrics) -> str:
-    """The true size at the time of the estimate, if a fault of the named type was injected on this surface.
+    """The true size at the time of the estimate, if a fault of the named type was injected on this surface
+    and has a size.
 
     The time of the estimate is `estimate_at_s`, or else the last frame. This time is written unless the only
-    fault of the surface is abrupt and lasts to the end, and the estimate belongs to the last frame.
+    fault of the surface is abrupt and lasts to the end, and the estimate belongs to the last frame. No text
+    if the size may change and the time is unknown.
     """
     faults = [fault for fault in metrics.faults if fault.actuator == isolation.fault]
     kind = isolation.type
@@ -375,6 +384,8 @@ def _true_size_text(isolation: Named, metrics: Metrics) -> str:
     if at_s is None:
         at_s = condition.flown_s - 1.0 / condition.rate_hz if condition and condition.rate_hz else math.inf
     lasts = faults[0].end_s is None and faults[0].profile == "abrupt" and len(faults) == 1
+    if math.isinf(at_s) and not lasts:
+        return ""
     when = "" if lasts and isolation.estimate_at_s is None else f" at {_seconds_text(at_s)}"
     size = size_at(kind, faults, at_s)
     if size is None:
@@ -402,8 +413,11 @@ def _detection_text(metrics: Metrics) -> str:
 def _statistical_text(statistical: Statistical) -> str:
     """When the statistical detector alone would have raised the alarm."""
     alarm = "no alarm" if statistical.time_s is None else f"alarm at {_seconds_text(statistical.time_s)}"
-    form = "{alarm}; threshold {alarm_level:.2f} σ, peak in healthy flight {closest_approach:.2f} of it"
-    return _filled(form, statistical, alarm=alarm)
+    return _filled(
+        "{alarm}; threshold {alarm_level:.2f} σ, peak in healthy flight {closest_approach:.2f} of it",
+        statistical,
+        alarm=alarm,
+    )
 
 
 def _isolation_text(metrics: Metrics) -> str:
@@ -439,7 +453,8 @@ def _withdrawn_texts(heading: str, withdrawn: Sequence[Withdrawn]) -> list[str]:
 
 
 def _named_fault_text(isolation: Named, metrics: Metrics) -> str:
-    """One named fault: its name, the delay, whether it is right, type, estimated and true size."""
+    """One named fault: its name, the delay, whether it is right or premature, type, estimated and true
+    size."""
     remaining = " (only remaining candidate)" if isolation.so_far else ""  # later data may exclude it, too
     when = "" if isolation.delay_s is None else f" after {_seconds_text(isolation.delay_s)}"
     right = "correct" if isolation.correct and isolation.type_correct is not False else "WRONG"
@@ -509,10 +524,12 @@ def _envelope_text(metrics: Metrics) -> str:
     """How often, how long and when first the flight left the validated envelope."""
     if not metrics.envelope_exits:
         return ""
-    times = _count_and_noun(metrics.envelope.exits, "time")
-    first = metrics.envelope_exits[0].start_s
-    form = "left {times}, {outside_s} in all, first at {first}"
-    return _filled(form, metrics.envelope, times=times, first=_seconds_text(first))
+    return _filled(
+        "left {times}, {outside_s} in all, first at {first}",
+        metrics.envelope,
+        times=_count_and_noun(metrics.envelope.exits, "time"),
+        first=_seconds_text(metrics.envelope_exits[0].start_s),
+    )
 
 
 # The counts of a link that are printed where they are not 0.

@@ -1,6 +1,6 @@
 """The summary of a sweep in words, for the terminal and the report.
 
-All words are computed from the summary document, so that they cannot disagree with `summary.json`. The
+All numbers are taken from the summary document, so that they cannot disagree with `summary.json`. The
 function of a line in `facts` returns an empty text if there is nothing to say, and the line is left out.
 """
 
@@ -12,7 +12,7 @@ from pathlib import Path
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.results.hints import NEAR_THRESHOLD_SHARE
 from beaver_ftc.results.model import Document, Expectation, Judged
-from beaver_ftc.results.verdict import printed, verdict_table
+from beaver_ftc.results.verdict import headed, printed, verdict_table
 from beaver_ftc.studies.present.page import (
     Heading,
     Links,
@@ -100,7 +100,7 @@ def expectations(summary: Document) -> list[tuple[str, str, str, bool]]:
 
 def verdict(summary: Document) -> Judged:
     """The judgement of the sweep, like that of a run. Each limit is an expectation with its own name."""
-    bounds = (
+    bounds = [
         Expectation(
             f"{expectation['name']}.{_side(expectation['expected'])}",
             expectation["passed"],
@@ -108,7 +108,7 @@ def verdict(summary: Document) -> Judged:
             f"{value(expectation['actual'])} of {expectation['of']} flights",
         )
         for expectation in summary["expectations"]
-    )
+    ]
     return Judged(summary["sweep"], summary["passed"], tuple(bounds))
 
 
@@ -146,10 +146,11 @@ def summary_text(summary: Document, colour: bool = False) -> str:
     worst = [f" {'; '.join(flight['why'])}:\n   {flight['replay']}" for flight in summary["worst"][:SHOWN]]
     headline = (title(summary), "bold green" if summary["passed"] else "bold red")
     lines = facts(summary)
-    for name, p, q, r in tracking(summary):
-        unit = "" if name == "ratio" else " deg/s"
-        label = "tracking RMS, median" if name.startswith("before") else ""
-        lines.append((label, f"p {p}  q {q}  r {r}{unit} {name}"))
+    errors = [
+        f"p {p}  q {q}  r {r}{'' if name == 'ratio' else ' deg/s'} {name}"
+        for name, p, q, r in tracking(summary)
+    ]
+    lines += headed("tracking RMS, median", errors)
     expected_lines = [
         (passed, f"{name} {bound}: {actual}") for name, bound, actual, passed in expectations(summary)
     ]

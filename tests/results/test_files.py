@@ -21,7 +21,6 @@ from beaver_ftc.results.metrics import metrics
         ("figures/tracking.pdf", b"x" * 5000 + b"beaver-ftc", True),
         ("figures/deep/tracking.png", b"beaver-ftc", False),  # a folder is no picture of ours
         ("aircraft/engine/own.xml", b"", True),
-        ("aircraft/own.yaml", b"", True),
         ("aircraft/notes.txt", b"", False),
         ("metrics.json", b"", True),
     ],
@@ -40,12 +39,11 @@ def test_what_is_ours_may_be_replaced_and_nothing_else(tmp_path, name, content, 
 def test_links_are_not_followed(tmp_path):
     (tmp_path / "picture").write_bytes(b"beaver-ftc")
     (tmp_path / "case" / "figures").mkdir(parents=True)
-    (tmp_path / "link").symlink_to(tmp_path / "case")
-    with pytest.raises(SimulationFailed, match="it exists and is not a folder"):
-        refuse_foreign(tmp_path / "link")
-    (tmp_path / "dangling").symlink_to(tmp_path / "nowhere")
-    with pytest.raises(SimulationFailed, match="it exists and is not a folder"):
-        refuse_foreign(tmp_path / "dangling")
+    for target in ("case", "nowhere"):
+        link = tmp_path / f"to-{target}"
+        link.symlink_to(tmp_path / target)
+        with pytest.raises(SimulationFailed, match="it exists and is not a folder"):
+            refuse_foreign(link)
     (tmp_path / "case" / "figures" / "a.png").symlink_to(tmp_path / "picture")
     with pytest.raises(SimulationFailed, match=r"it holds figures/a\.png"):
         refuse_foreign(tmp_path / "case")

@@ -1,8 +1,8 @@
 """The result folder of a run: it appears whole or not at all.
 
 Everything is written into a hidden sibling of the final folder, which is renamed into place at the end. A
-killed run leaves only the hidden folder. A hidden folder is locked while in use: if the next run can lock it,
-it is stale, and the run removes it.
+killed run leaves only hidden folders, and the parents that it created. A hidden folder is locked while in
+use: if the next run can lock it, it is stale, and the run removes it, or puts an old result back.
 """
 
 import contextlib
@@ -19,7 +19,7 @@ from beaver_ftc.documents.errors import SimulationFailed
 
 try:
     import fcntl
-except ImportError:  # not a POSIX system: nothing can be locked, so nothing is taken for stale
+except ImportError:  # not a POSIX system: nothing can be locked or synced, and nothing is taken for stale
     fcntl = None  # type: ignore[assignment]
 
 # The files of a run. Commands that write other files into a result folder declare these themselves.
@@ -29,6 +29,7 @@ FILES_OF_A_RUN = frozenset({
 })  # fmt: skip
 AIRCRAFT = "aircraft"  # folder with the copy of an own aircraft, to fly it again
 MODEL_FILES = frozenset({".xml", ".yaml"})  # endings of the files of an aircraft
+_RETIRED = "-replaced"  # end of the hidden name of an old result, until the new one is in its place
 _PICTURE_END_BYTES = 2048  # read at each end of a picture: metadata come first, those of a PDF last
 # Arguments of Linux' renameat2: paths are relative to the working directory; swap the two in one step.
 _AT_FDCWD = -100
@@ -37,23 +38,26 @@ _RENAME_EXCHANGE = 2
 
 @contextlib.contextmanager
 def result_folder(out: Path, name: str, files: Iterable[str] = ()) -> Iterator[Path]:
-    """Yield an empty folder to fill. On success it becomes `out/name`; on any failure it is removed.
+    """Yield an empty folder to fill. On success it becomes `out/name`; on any failure it is removed, with the
+    parents that were created for it.
 
     files: names that an earlier result of this kind may have. Raises SimulationFailed if the folder cannot be
     written, or if `out/name` is not a result of ours.
     """
     final = out / name
+    _remove_stale(final)
     state = "the result that was there is as it was" if final.is_dir() else "nothing is left there"
     with clear_disk_errors(final, f"; {state}"):
         refuse_foreign(final, files)
         created = _make_parents(out)
-        _remove_stale(out, name)
         token = uuid4().hex
         unnamed = out / f".beaver-ftc-{token}"
         hidden = out / f"{partial_prefix(name)}{token}"
         unnamed.mkdir()
         try:
-            with locked(unnamed):  # lock first: under its hidden name, another run would take it for stale
+            # Lock first: under its hidden name, another run would take it for stale. A run that is killed
+            # before the new name leaves an empty folder that no run removes.
+            with locked(unnamed):
                 unnamed.rename(hidden)
                 yield hidden
                 for path in (*hidden.rglob("*"), hidden):  # the content reaches the disk before the name
@@ -111,12 +115,12 @@ def _is_our_picture(path: Path) -> bool:
 
 
 @contextlib.contextmanager
-def clear_disk_errors(folder: Path, but: str = "") -> Iterator[None]:
-    """Turn an error of the operating system into SimulationFailed with one line, which ends with `but`."""
+def clear_disk_errors(folder: Path, ending: str = "") -> Iterator[None]:
+    """Turn an error of the operating system into SimulationFailed with one line, which ends with `ending`."""
     try:
         yield
     except OSError as error:
-        raise SimulationFailed(f"cannot write {folder}: {disk_error_text(error)}{but}") from error
+        raise SimulationFailed(f"cannot write {folder}: {disk_error_text(error)}{ending}") from error
 
 
 def disk_error_text(error: OSError) -> str:
@@ -156,16 +160,21 @@ def locked(folder: Path) -> Iterator[bool]:
         os.close(descriptor)
 
 
-def _remove_stale(out: Path, name: str) -> None:
-    """Remove the hidden folders that killed runs of this name have left."""
-    for leftover in out.glob(f"{partial_prefix(name)}*"):
+def _remove_stale(final: Path) -> None:
+    """Remove the hidden folders that killed runs of this result have left. If a run was killed after it had
+    renamed the old result away, and nothing is in its place, put the old result back."""
+    for leftover in final.parent.glob(f"{partial_prefix(final.name)}*"):
         with contextlib.suppress(OSError), locked(leftover) as stale:
-            if stale:
+            if stale and leftover.name.endswith(_RETIRED) and not final.exists():
+                leftover.rename(final)
+            elif stale:
                 shutil.rmtree(leftover, ignore_errors=True)
 
 
 def sync(path: Path) -> None:
-    """Bring a file, or the names in a folder, to the disk."""
+    """Bring a file, or the names in a folder, to the disk, on a POSIX system."""
+    if not fcntl:  # elsewhere, a folder cannot be opened, nor a file be synced that is open for reading
+        return
     descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)
@@ -174,7 +183,8 @@ def sync(path: Path) -> None:
 
 
 def _move_into_place(hidden: Path, final: Path, files: Iterable[str]) -> None:
-    """Rename the hidden folder; an older result is swapped with it, or renamed away, and then removed."""
+    """Rename the hidden folder; an older result is swapped with it, or renamed away, and then removed. If
+    the hidden folder cannot be renamed, the older result gets its name back."""
     refuse_foreign(final, files)
     try:
         hidden.rename(final)  # without a test first: another run of this name may end in between
@@ -185,10 +195,15 @@ def _move_into_place(hidden: Path, final: Path, files: Iterable[str]) -> None:
     if _swap_folders(hidden, final):
         shutil.rmtree(hidden, ignore_errors=True)
     else:
-        retired = hidden.with_name(f"{hidden.name}-replaced")
-        final.rename(retired)
-        hidden.rename(final)
-        shutil.rmtree(retired, ignore_errors=True)
+        retired = hidden.with_name(f"{hidden.name}{_RETIRED}")
+        with locked(final):  # under its hidden name, too
+            final.rename(retired)
+            try:
+                hidden.rename(final)
+            except OSError:
+                retired.rename(final)
+                raise
+            shutil.rmtree(retired, ignore_errors=True)
 
 
 def _swap_folders(first: Path, second: Path) -> bool:

@@ -48,19 +48,15 @@ class FaultTypesConfig(NamedTuple):
     single_instant      whether a frame, or block, shows one instant
     n_substeps          number of JSBSim frames in a frame
     returns_lagged      whether a released surface returns with the lag of its actuator
-    half_blocks         number of blocks in half a period of the slowest oscillation
     frames_per_block    number of frames in a block, 1 if every frame is examined by itself
     block_duration_s    duration of a block
-    dt_s                duration of a frame
     """
 
     single_instant: bool
     n_substeps: int
     returns_lagged: bool
-    half_blocks: int
     frames_per_block: int
     block_duration_s: float
-    dt_s: float
 
 
 class Actuator(NamedTuple):
@@ -269,7 +265,7 @@ class DiagnosisReadout:
     @cached_property
     def types_config(self) -> FaultTypesConfig:
         """How fault types are examined."""
-        names = "single_instant n_substeps returns_lagged half_frames frames_per_block block_duration_s dt"
+        names = "single_instant n_substeps returns_lagged frames_per_block block_duration_s"
         return _read(FaultTypesConfig, self._fdi["types"]["config"], names)
 
     @cached_property

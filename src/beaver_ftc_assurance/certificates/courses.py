@@ -184,12 +184,13 @@ def _exclude_runaway(bounds: SurfaceBounds) -> Document | None:
 
 def _exclude_oscillation(bounds: SurfaceBounds) -> Document | None:
     """Exclude an oscillation about the command: the surface is on one side of the command from frame i to
-    frame k, for longer than half of the slowest period: k - i > pi / (slowest_rad_s dt)."""
+    frame k, for longer than half of the slowest period: k - i > pi / (slowest_rad_s dt). The right side is
+    rounded up where the run is chosen, as in the diagnosis."""
+    half_period = pi / bounds.slowest_rad_s / bounds.config.block_duration_s
     for axis, beyond, starts in bounds.runs_beyond(bounds.command):
-        for k in np.flatnonzero(np.arange(len(starts)) - starts > bounds.config.half_blocks)[:1].tolist():
+        for k in np.flatnonzero(np.arange(len(starts)) - starts > np.ceil(half_period))[:1].tolist():
             run = range(int(starts[k]), k + 1)
-            half_period_frames = pi / bounds.slowest_rad_s / bounds.config.dt_s
-            pairs = [(k - run[0], half_period_frames), *_positive_pairs(beyond, run)]
+            pairs = [(k - run[0], half_period), *_positive_pairs(beyond, run)]
             return bounds.statement(run, None, pairs, {"slowest_rad_s": bounds.slowest_rad_s}, axis)
     return None
 

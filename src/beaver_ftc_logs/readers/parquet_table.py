@@ -20,8 +20,9 @@ BATCH_ROWS = 50_000  # number of rows that are read at once
 class ParquetTable:
     """The table in a Parquet file.
 
-    readable_names: its columns of numbers. Other columns are never read, since a list in a cell may have any
-    size.
+    It has the members of `TextTable`, so that table.py reads both alike. readable_names: its columns of
+    numbers; table.py reads no others, since a list in a cell may have any size. doubled_names: names that
+    several columns have.
     """
 
     def __init__(self, path: Path) -> None:
@@ -30,6 +31,7 @@ class ParquetTable:
 
         with parquet.ParquetFile(path) as file:
             schema = file.schema_arrow
+            self._metadata = file.metadata
         self.names = list(schema.names)
         self.doubled_names = {name for name, n in Counter(self.names).items() if n > 1}
         is_number = [pa.types.is_integer(field.type) or pa.types.is_floating(field.type) for field in schema]
@@ -43,20 +45,20 @@ class ParquetTable:
         """Nothing to check: a Parquet file has no lines."""
 
     def blocks(self, path: Path, names: Sequence[str]) -> Iterator[TableCells]:
-        """The rows of some columns in batches. The last batch is empty."""
-        from pyarrow import parquet
-
-        file = parquet.ParquetFile(path)
-        _check_parquet_size(path, file.metadata, names)
-        return _parquet_batches(file, names)
+        """The rows of some columns in batches. The last batch is empty. Raises BadInput for a table that is
+        too large."""
+        _check_parquet_size(path, self._metadata, names)
+        return _parquet_batches(path, names)
 
 
-def _parquet_batches(file: Any, names: Sequence[str]) -> Iterator[TableCells]:
-    """Yield the cells of a file in batches; the last is empty."""
+def _parquet_batches(path: Path, names: Sequence[str]) -> Iterator[TableCells]:
+    """Yield the cells of a file in batches, nan for a null; the last batch is empty."""
+    from pyarrow import parquet
+
     n_read = 0
-    with file:
+    with parquet.ParquetFile(path) as file:
         for batch in file.iter_batches(BATCH_ROWS, columns=list(names)):
-            numbers = {name: np.asarray(batch[name].to_numpy(), dtype=float) for name in names}
+            numbers = {name: batch[name].to_numpy(zero_copy_only=False).astype(float) for name in names}
             yield TableCells(numbers, batch.num_rows, n_read)
             n_read += batch.num_rows
     yield TableCells({name: np.empty(0) for name in names}, 0, n_read)

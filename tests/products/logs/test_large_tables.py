@@ -3,7 +3,7 @@
 import numpy as np
 import pyarrow as pa
 import pytest
-from pyarrow import parquet
+from pyarrow import csv, parquet
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs.readers import read_flight
@@ -31,7 +31,6 @@ def test_billions_of_rows_in_a_tiny_file_are_one_line(tmp_path):
     names = [name for name in synthetic.fly(5.0) if name != "left_effectiveness"]
     table = pa.table({name: np.zeros(500_000, dtype=np.int8) for name in names})
     path = repeated(tmp_path / "bomb.parquet", table, 13)
-    assert path.stat().st_size < 20_000_000
     statuses, said = limited.run([["identify", path, "--vehicle", vehicle, "--out", tmp_path / "model.json"]])
     assert statuses == [2]
     assert said == f"{path}: has 4,096,000,000 rows, allowed: up to 10,000,000\n"
@@ -44,16 +43,16 @@ def test_a_table_too_wide_for_its_rows_is_one_line(tmp_path):
         read_flight(path)
 
 
-def test_a_list_in_a_cell_is_not_read(tmp_path):
-    """A column of lists beside the flight's: 5 GB of numbers if it were read."""
+def test_a_list_in_a_cell_is_not_read_and_a_cell_without_a_number_is_nan(tmp_path):
+    """A column of lists beside the flight's: 5 GB of numbers if it were read. One of nulls is read as nan."""
     flown = pa.table(synthetic.fly(60.0))
     lengths = np.concatenate([[0], np.full(len(flown), 1_000_000)]).astype(np.int32)
     lists = pa.ListArray.from_arrays(pa.array(lengths), pa.array(np.zeros(1_000_000, dtype=np.int64)))
-    table = flown.append_column("lists", lists)
+    table = flown.append_column("lists", lists).append_column("nulls", pa.nulls(len(flown), pa.int8()))
     path = tmp_path / "lists.parquet"
     parquet.write_table(table, path)
     recording = read_flight(path)
-    assert np.isnan(recording.columns["lists"].values).all()
+    assert np.isnan([recording.columns[name].values for name in ("lists", "nulls")]).all()
     np.testing.assert_array_equal(recording.columns["p_rad_s"].values, flown["p_rad_s"].to_numpy())
 
 
@@ -62,16 +61,11 @@ def test_a_doubled_column_is_one_line_if_it_is_used(tmp_path, suffix):
     columns = synthetic.fly(5.0)
     table = pa.table(columns).append_column("p_rad_s", pa.array(columns["p_rad_s"]))
     path = tmp_path / f"flight.{suffix}"
-    if suffix == "csv":
-        from pyarrow import csv
-
-        csv.write_csv(table, path)
-    else:
-        parquet.write_table(table, path)
+    {"csv": csv.write_csv, "parquet": parquet.write_table}[suffix](table, path)
     with pytest.raises(BadInput, match="has two columns p_rad_s, allowed: one of a name"):
         read_flight(path, columns=["q_rad_s", "p_rad_s"])
     others = read_flight(path, columns=["q_rad_s"])
-    assert others.columns["q_rad_s"].values.tolist() == pytest.approx(columns["q_rad_s"].tolist())
+    np.testing.assert_allclose(others.columns["q_rad_s"].values, columns["q_rad_s"])
 
 
 @pytest.mark.parametrize("text", ["uint64_t timestamp;wide[60000] a;", "uint64_t timestamp;bomb a;"])

@@ -98,7 +98,7 @@ def test_the_four_verdicts(number, without, elsewhere, verdict):
     built = claim._replace(construction=True)  # of which no ablation is flown elsewhere
     assert built.verdict(1.0, 3.0, [(2.0, np.nan)]) == claims.STRONGER
     assert built.verdict(1.0, 3.0, [(2.1, np.nan)]) == claims.BORNE_OUT
-    assert not built.testable
+    assert not built.is_borne_out(2.0, np.nan)
 
 
 def test_numbers_agree_with_the_log_itself():

@@ -93,9 +93,9 @@ class Claim(NamedTuple):
         return bool(number >= self.limit if self.measure.at_least else number <= self.limit)
 
     def is_borne_out(self, number: float, without: float) -> bool:
-        """Whether the claim holds, and not in its ablation, whose number is `without`. A number that was not
-        flown is nan, and keeps no limit."""
-        return self.holds(number) and not self.holds(without)
+        """Whether the claim holds, and not in its ablation, whose number is `without`. False for a claim that
+        flights cannot contradict, since its ablation is flown in the published setting alone."""
+        return self.testable and self.holds(number) and not self.holds(without)
 
     def verdict(self, number: float, without: float, elsewhere: Sequence[tuple[float, float]]) -> str:
         """One of VERDICTS. number: in the published setting. without: in its ablation. elsewhere: both

@@ -49,7 +49,7 @@ def quantity_text(claim: Document) -> str:
 def limit(claim: Document) -> str:
     """The limit that the number must keep."""
     share = claim["unit"].startswith("of ")
-    text = f"{100 * claim['limit']:.0f} %" if share else tables.number(claim["limit"], claim["unit"])
+    text = tables.number(100 * claim["limit"], "%") if share else tables.number(claim["limit"], claim["unit"])
     return f"{'at least' if claim['at_least'] else 'at most'} {text}"
 
 
@@ -181,8 +181,8 @@ def adaptation_sentence(document: Document) -> str:
 def summary(document: Document) -> str:
     """The results in a few sentences."""
     return (
-        f"{headline(document)} A statement holds if its number keeps its limit, and no longer does in the "
-        f"same setting without its mechanism. {adaptation_sentence(document)}"
+        f"{headline(document)} A statement holds if its number keeps its limit. In the same setting without "
+        f"their mechanism, the {document['testable']['hold']} do not hold. {adaptation_sentence(document)}"
     )
 
 

@@ -29,10 +29,11 @@ def text_of(document: Document) -> str:
     sections = {
         "after the alarm: every estimator, the network and the fault-tolerant law at work": _rows(document),
         "before the alarm": _rows(document["before_alarm"]),
-        "other ways, after the alarm": [
+        "other ways, after the alarm, in a sixth of the rounds, at least 3": [
             _row(_ALTERNATIVES[name], figures) for name, figures in document["alternatives"].items()
         ],
-        f"whole flights of {whole_flights['frames']} frames, loading and trim included": [
+        f"whole flights of {whole_flights['frames']} frames, loading and trim included, in a tenth of the "
+        "rounds, at least 3": [
             *_rows(whole_flights),
             _row(
                 "with a log file",
@@ -47,7 +48,8 @@ def text_of(document: Document) -> str:
     }
     return "\n".join([
         "{processor}, {cores} cores, Python {python}, JSBSim {jsbsim}".format(**document["machine"]),
-        "us a frame: medians [quartiles] over {rounds} rounds of {frames_a_round} frames".format(**document),
+        "us a frame: medians [quartiles] over {rounds} rounds of {frames_a_round} frames, unless a "
+        "title has others".format(**document),
         *(f"\n{title}\n{aligned(rows)}" for title, rows in sections.items()),
     ])  # fmt: skip
 

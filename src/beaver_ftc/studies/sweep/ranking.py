@@ -2,7 +2,7 @@
 matter.
 
 `explained` is the share of the variance of the ranks of the outcome between groups of flights with similar
-values of the key, corrected for chance (Kruskal and Wallis' epsilon squared). Its p-value is from random
+values of the key, corrected for chance (Kelley's epsilon squared, of the ranks). Its p-value is from random
 permutations of the outcome. It is adjusted for the number of keys: the share is compared with the largest
 share of all keys in each permutation [WestfallYoung1993].
 """
@@ -21,8 +21,9 @@ Ranking = list[Document]
 def rank(keys: dict[str, np.ndarray], outcome: np.ndarray) -> Ranking:
     """The keys, ordered by the share of the outcome that they explain, the largest first.
 
-    keys: by name, values (n,), numbers or texts. outcome (n,), which may be infinite. An entry has `key`,
-    `explained` (share of the variance of ranks), `rank_correlation` (Spearman's, null for texts) and
+    keys: by name, values (n,), numbers, or texts as an array of objects. outcome (n,), which may be infinite.
+    An entry has `key`, `explained` (share of the variance of ranks, at least 0), `rank_correlation`
+    (Spearman's, null for texts) and
 
         p_value = (1 + permutations in which any key explains as much) / (1 + permutations)
 

@@ -1,10 +1,10 @@
 """Other days, made from a recorded flight: changes between two flights of one vehicle are put into its log.
 
-Either the rates are kept and the commands are changed to those that would have caused them, or the other way
-round, so that the log satisfies the equation of motion of the vehicle. Labels stay as they are. A model is
-identified from one half of a labelled flight and scored on the other half, altered; if there are several
-flights, from all but one. The levels of effectiveness are fitted to the whole of a single flight. The
-settings were chosen on the first drawn days (TUNING_SEEDS); the result is that of the others (TEST_SEEDS).
+The commands are changed to those that would have caused the rates on another day; a change of the excitation
+scales both, and a change of the noise adds noise to the rates. Labels stay as they are. A model is identified
+from one half of a labelled flight and scored on the other half, altered; if there are several flights, from
+all but one. The levels of effectiveness are fitted to the whole of a single flight. The settings were chosen
+on the first drawn days (TUNING_SEEDS); the result is that of the others (TEST_SEEDS).
 """
 
 from collections.abc import Iterator, Sequence
@@ -42,9 +42,10 @@ class DayChanges:
     surface with a loss of effectiveness needs more command for it. neutral_shift_commands (S,): the same, not
     affected by a loss. common_gain: factor on the effect of all surfaces on the motion about trim (airspeed).
     surface_gains (S,): factor of each surface. command_delay_s: additional delay of the commands.
-    motion_scale: factor on all motion, at the same noise. noise_ratio: standard deviation of the noise in
-    the rates, over that of the recorded day. trim_drift_sd_commands: standard deviation of the drift of
-    the trim, in commands.
+    motion_scale: factor on all motion; above 1, it is a factor on the noise of the recorded rates, too.
+    noise_ratio: standard deviation of the noise in the rates, over that of the recorded day, while
+    motion_scale is at most 1. trim_drift_sd_commands: standard deviation of the drift of the trim, in
+    commands.
     """
 
     name: str
@@ -110,12 +111,15 @@ def apply_day_changes(day: DayChanges, samples: Samples, A: Floats, Q: Floats) -
         x <- mean(x) + motion (x - mean(x)) + extra noise
         extra^2 = max(noise_ratio^2 - min(motion, 1)^2, 0)
 
+    The noise in x has sqrt(motion^2 + extra^2) times the standard deviation of the recorded day.
+
     mean: running mean over _TRIM_MEAN_S; motion, neutral, trim: of the day; gain: common gain times that of
-    each surface; drift: coloured noise, of correlation time _DRIFT_TIME_S; e (n, S): effectiveness. A (3 h,
-    3): how its model's rates answer their own past, Q (3, 3) (rad/s)2: covariance of its noise.
+    each surface; drift: coloured noise, of correlation time _DRIFT_TIME_S; e (n, S): effectiveness, 1 where
+    it is unknown, and where it is 0, since no command makes up for a total loss. A (3 h, 3): how its model's
+    rates answer their own past, Q (3, 3) (rad/s)2: covariance of its noise.
     """
     rng = np.random.default_rng(20)
-    e = np.where(np.isfinite(samples.labels), samples.labels, 1.0)
+    e = np.where(samples.labels > 0.0, samples.labels, 1.0)
     commands = _shifted(samples.commands, day.command_delay_s / samples.dt_s)
     trim = _running_mean(commands, round(_TRIM_MEAN_S / samples.dt_s))
     commands = trim + day.motion_scale * (commands - trim) / (day.common_gain * day.surface_gains)

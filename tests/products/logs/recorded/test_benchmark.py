@@ -20,7 +20,7 @@ def folder(tmp_path_factory):
     root = tmp_path_factory.mktemp("flights")
     (root / "wing").mkdir()
     (root / "wing" / "vehicle.yaml").write_text(synthetic.VEHICLE)
-    parts = ((60, 130, 1.0, 0.5), (170, 230, 0.4, 1.0))
+    parts = ((60, 130, 1.0, 0.5), (170, 230, 0.0, 1.0))
     for seed in (21, 22):
         flown = synthetic.fly(280.0, parts=parts, seed=seed)
         synthetic.write_csv(root / "wing" / f"flight-{seed}.csv", flown)

@@ -167,8 +167,8 @@ def _draw_failure_delays(axis: Any, data: Document) -> None:
     right has the failures that were not found within _SHOWN_DELAY_S.
     """
     titles = _method_titles(data)
-    distinct = dict.fromkeys(entry["failure"] for entry in data["flights"])
-    failures = [failure for failure in distinct if failure and ENGINE not in failure]
+    logged = dict.fromkeys(row["failure"] for row in data["flights"])
+    failures = [failure for failure in logged if failure and ENGINE not in failure]
     for i, failure in enumerate(failures):
         shift = 0.7 * ((i + 0.5) / len(failures) - 0.5)
         entries = [row for row in data["flights"] if row["failure"] == failure and row["method"] in titles]

@@ -48,9 +48,10 @@ def test_a_list_in_a_cell_is_not_read_and_a_cell_without_a_number_is_nan(tmp_pat
     flown = pa.table(synthetic.fly(60.0))
     lengths = np.concatenate([[0], np.full(len(flown), 1_000_000)]).astype(np.int32)
     lists = pa.ListArray.from_arrays(pa.array(lengths), pa.array(np.zeros(1_000_000, dtype=np.int64)))
-    table = flown.append_column("lists", lists).append_column("nulls", pa.nulls(len(flown), pa.int8()))
-    path = tmp_path / "lists.parquet"
-    parquet.write_table(table, path)
+    nulls = pa.nulls(len(flown), pa.int8())
+    path = synthetic.write_parquet(
+        tmp_path / "lists.parquet", flown.append_column("lists", lists).append_column("nulls", nulls)
+    )
     recording = read_flight(path)
     assert np.isnan([recording.columns[name].values for name in ("lists", "nulls")]).all()
     np.testing.assert_array_equal(recording.columns["p_rad_s"].values, flown["p_rad_s"].to_numpy())

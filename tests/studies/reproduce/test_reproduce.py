@@ -93,7 +93,6 @@ def test_every_mechanism_has_a_statement_that_fails_without_it():
 )  # fmt: skip
 def test_the_four_verdicts(number, without, elsewhere, verdict):
     claim = MEASURED[0]._replace(limit=2.0, construction=False)
-    assert not claim.measure.at_least
     assert claim.verdict(number, without, elsewhere) == verdict
     built = claim._replace(construction=True)  # of which no ablation is flown elsewhere
     assert built.verdict(1.0, 3.0, [(2.0, np.nan)]) == claims.STRONGER

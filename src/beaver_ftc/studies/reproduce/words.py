@@ -22,7 +22,6 @@ WIDTH = 132
 VERDICT_HEAD = ("Published", "Statement", "Our number", "Limit", "Without", "Verdict", "Remark")
 _SAYS = parse(Path(__file__).with_name("page.yaml").read_text(encoding="utf-8")).data
 ELSEWHERE_TOO = "borne out, elsewhere too"
-SHOWN_AS = {STRONGER: ELSEWHERE_TOO}  # words for a verdict whose name in the document says too much
 DEVIATIONS: list[str] = _SAYS["deviations from the paper"]
 _STYLE = {STRONGER: "green", BORNE_OUT: "green", NOT_BORNE_OUT: "bold red"}
 _GOOD = {ELSEWHERE_TOO: True, BORNE_OUT: True, NOT_BORNE_OUT: False}
@@ -73,9 +72,8 @@ def verdict_rows(document: Document) -> list[tuple[str, ...]]:
 
 
 def verdict_words(claim: Document) -> str:
-    """The verdict on a claim in words."""
-    verdict: str = claim["verdict"]
-    return SHOWN_AS.get(verdict, verdict)
+    """The verdict on a claim in words; STRONGER, whose name in the document says too much, has its own."""
+    return ELSEWHERE_TOO if claim["verdict"] == STRONGER else claim["verdict"]
 
 
 def remark(claim: Document) -> str:

@@ -113,8 +113,9 @@ def design_record(
 
 @kernel
 def response(design, x, y, f, G):
-    """Fill f (3,) rad/s2 and G (3, n) rad/s2 per rad of the design model, simplified or not, at x (3,) and
-    y."""
+    """Fill f (3,) rad/s2 and G (3, n) rad/s2 per rad of the design model, simplified or not, at x (3,) and y.
+
+    With a frozen alpha, y has it for the time of the call: a kernel makes no copy."""
     if design.linearised:
         linear_response(design, x, y, f, G)
     elif design.frozen_alpha:

@@ -41,7 +41,7 @@ def _regressor(scenario: bf.Scenario, log: pd.DataFrame, rates: np.ndarray) -> n
     """Z of pitch, rad/s2: the moment that the healthy surface gives, from the frame before."""
     design = design_of(Declared.of(scenario))[0].view(np.recarray)
     signals = ("alpha_rad", "beta_rad", "airspeed_mps", "qdyn_pa", "dpt")
-    y, s = log[list(signals)].to_numpy(), scenario.airframe.surfaces.index(SURFACE)
+    y, s = log[list(signals)].to_numpy(copy=True), scenario.airframe.surfaces.index(SURFACE)
     u, Z = log[f"{SURFACE}_cmd_rad"].to_numpy(), np.full(len(rates), np.nan)
     f, G = np.zeros(3), np.zeros_like(design.G0)
     for k in range(1, len(rates)):

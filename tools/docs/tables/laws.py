@@ -6,7 +6,7 @@ from beaver_ftc.control.laws.loop_design import RATIO
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.loop.readout import FrameReadout
 from beaver_ftc.scenario.schema import load
-from beaver_ftc.studies.margins import study
+from beaver_ftc.studies.margins import over_airspeeds
 from beaver_ftc.studies.present.tables import markdown_table
 
 DECLARED = {
@@ -38,7 +38,7 @@ def least_margins() -> str:
     """The least margins that `beaver-ftc linearise` finds, over airspeeds, faults and surfaces."""
     rows = []
     for declared, keys in DECLARED.items():
-        found = study(load(keys))
+        found = over_airspeeds(load(keys))
         gain = min(min(one.up_db, one.down_db) for one in found)
         phase = min(one.phase_deg for one in found)
         rows.append((declared, str(len(found)), f"{gain:.1f}", f"{phase:.0f}"))

@@ -92,7 +92,7 @@ TYPES = (
             n_half=int, first_end=int, last_end=int,  # half-cycles that have ended; end of the first and last
             square=float, square_past=float,  # sums of (p - u)^2, rad2: this half-cycle, whole ones before
         ),
-        has_shown=has_shown, show_half_cycles=MIN_HALF_CYCLES, evidence_at_rest=REST_EXCLUDES_TYPE,
+        has_shown=has_shown, show_half_cycles=2, evidence_at_rest=REST_EXCLUDES_TYPE,
         can_look_like=("rate_limit",),
         accommodation_mode=SUBTRACT_OFFSET, frames_test="swing",
         estimate_parameter=estimate_parameter, estimate_frequency_rad_s=estimate_frequency,

@@ -145,9 +145,8 @@ def _keeping(study: Study, out: Path) -> Iterator[store.Parts]:
                 raise
             files.empty(hidden)
     finally:
-        with contextlib.suppress(
-            OSError
-        ):  # a folder with parts stays, and one that another process has locked
+        # A folder with parts cannot be removed, nor one that another process has locked meanwhile.
+        with contextlib.suppress(OSError):
             hidden.rmdir()
             if is_new:
                 out.rmdir()

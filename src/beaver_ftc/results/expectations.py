@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from beaver_ftc.results.model import Expectation, Metrics
-from beaver_ftc.scenario.measured_range import in_words
+from beaver_ftc.scenario import measured_range
 from beaver_ftc.scenario.warnings import OF_DIAGNOSIS
 
 MOTION_OF_AXIS = {"p": "roll", "q": "pitch", "r": "yaw"}
@@ -47,8 +47,14 @@ class Rule:
         actual = "" if is_as_expected else value_text(result.actual)
         return f"{self.says} {value_text(result.expected)}", actual
 
+    def margin(self, result: Expectation) -> float | None:
+        """Distance of the actual value from a limit, in the unit of the limit; None here: it is no limit."""
 
-class Among(Rule):
+    def share(self, result: Expectation) -> float | None:
+        """Share of a limit that the actual value takes; None here: it is no limit."""
+
+
+class AmongCandidates(Rule):
     """An expectation that a fault type is among the candidates."""
 
     def is_met(self, actual: Any, expected: Any) -> bool:
@@ -68,10 +74,20 @@ class Limit(Rule):
 
     def texts(self, result: Expectation) -> Texts:
         """The limit, and the value with its share of the limit."""
-        share = _share_of_limit(result)
+        share = self.share(result)
         of_limit = "" if share is None else f" ({three_digits(100 * share)} % of the limit)"
         actual = value_text(result.actual) + ("" if result.actual is None else f" {self.unit}{of_limit}")
         return f"{self.says} ≤ {value_text(result.expected)} {self.unit}", actual
+
+    def margin(self, result: Expectation) -> float | None:
+        """Limit - |actual|, negative if the limit is exceeded; None if there is no actual value."""
+        return None if result.actual is None else float(result.expected - abs(result.actual))
+
+    def share(self, result: Expectation) -> float | None:
+        """|actual| / limit; None if there is no actual value, or if the limit is 0."""
+        if result.actual is None or not result.expected:
+            return None
+        return abs(float(result.actual)) / result.expected
 
 
 @dataclass(frozen=True)
@@ -103,7 +119,7 @@ RULES: dict[str, Rule] = {
     "isolated_within_s": Limit("isolation.delay_s", "isolation delay", "s"),
     "isolated_as": Rule("isolation.fault", "isolated fault"),
     "isolated_type": Rule("isolation.type", "fault type"),
-    "candidate_type": Among("isolation.candidates", "possible fault types include"),
+    "candidate_type": AmongCandidates("isolation.candidates", "possible fault types include"),
     "no_false_alarm": Absence("false_alarm", "no false alarm", "a false alarm"),
     "no_departure": Absence("departure", "no departure", "a departure"),
     "stays_in_envelope": Absence("envelope.exits", "stays in the envelope", "leaves the envelope"),
@@ -165,38 +181,39 @@ def _judged(name: str, expected: Any, metrics: Metrics) -> Expectation:
 def _reason_not_met(expected: Any, is_early: bool, metrics: Metrics) -> str | None:
     """The reason why an expectation of the diagnosis is not met; None if it is not known. is_early: the fault
     was named before it began."""
-    detection = metrics.detection
     isolation = metrics.isolation
     if is_early:
         return f"{isolation.fault} was named at {isolation.time_s:g} s, before the fault began"
-    for earlier in reversed(isolation.withdrawn if isolation else ()):
+    for earlier in reversed(isolation.withdrawn):
         if earlier.fault == expected:
             return (
                 f"{expected} was named at {earlier.from_s:g} s, and the name withdrawn at {earlier.to_s:g} s"
             )
-    inconclusive = detection and detection.inconclusive
-    return in_words(inconclusive.document()) if inconclusive else None
+    inconclusive = metrics.at("detection.inconclusive")
+    return measured_range.in_words(inconclusive.document()) if inconclusive else None
+
+
+def _rule_of(result: Expectation) -> Rule:
+    """The rule of an expectation. A key without a rule has the words of its name."""
+    return RULES.get(result.name) or Rule("", without_underscores(result.name))
 
 
 def margin(expectation: Expectation) -> float | None:
     """Distance of a value from its limit, in the unit of the limit, negative if the limit is exceeded. None
     if the expectation has no limit, or the quantity does not exist."""
-    expected = expectation.expected
-    actual = expectation.actual
-    if isinstance(expected, bool) or not isinstance(expected, int | float) or actual is None:
-        return None
-    return float(expected - abs(actual))
+    return _rule_of(expectation).margin(expectation)
 
 
 class ExpectationInWords(NamedTuple):
     """An expectation compared with the flight.
 
-    limit: the expected value. actual: the actual value; empty if it adds nothing. share_of_limit: |actual| /
-    limit; None if the expectation is no limit, the limit is 0, or there is no actual value.
+    expected, actual: the two values; the actual one is empty if it adds nothing, and ends with the reason of
+    a failure. share_of_limit: |actual| / limit; None if the expectation is no limit, the limit is 0, or there
+    is no actual value.
     """
 
     name: str
-    limit: str
+    expected: str
     actual: str
     passed: bool
     share_of_limit: float | None
@@ -204,7 +221,7 @@ class ExpectationInWords(NamedTuple):
     @property
     def sentence(self) -> str:
         """Expected and actual in one line."""
-        return f"{self.limit}, got {self.actual}" if self.actual else self.limit
+        return f"{self.expected}, got {self.actual}" if self.actual else self.expected
 
 
 def expectations_in_words(metrics: Metrics) -> list[ExpectationInWords]:
@@ -213,21 +230,11 @@ def expectations_in_words(metrics: Metrics) -> list[ExpectationInWords]:
 
 
 def _in_words(result: Expectation) -> ExpectationInWords:
-    """One expectation in words. A key without a rule has the words of its name."""
-    rule = RULES.get(result.name) or Rule("", without_underscores(result.name))
-    limit, actual = rule.texts(result)
-    reason = result.reason if actual or not result.passed else ""
-    share = _share_of_limit(result) if isinstance(rule, Limit) else None
-    return ExpectationInWords(
-        result.name, limit, "; ".join(filter(None, (actual, reason))), result.passed, share
-    )
-
-
-def _share_of_limit(result: Expectation) -> float | None:
-    """|actual| / expected; None if there is no actual value, or if 0 is expected."""
-    return (
-        abs(float(result.actual)) / result.expected if result.expected and result.actual is not None else None
-    )
+    """One expectation in words."""
+    rule = _rule_of(result)
+    expected, actual = rule.texts(result)
+    actual = "; ".join(filter(None, (actual, result.reason)))
+    return ExpectationInWords(result.name, expected, actual, result.passed, rule.share(result))
 
 
 def value_text(value: Any) -> str:

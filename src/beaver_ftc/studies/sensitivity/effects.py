@@ -16,14 +16,16 @@ from beaver_ftc.studies.sensitivity.systems import MECHANISMS, SYSTEMS, Mechanis
 
 LATE_S = 0.1  # an alarm that is later by more than this is late
 WORSE = 1.1  # a tracking error larger by more than this factor is worse
-Outcomes = Sequence[Document]  # outcomes of several flights
-Pair = tuple[Document, Document]  # outcomes (a, b) of a draw: a with the mechanism, b without it
+Outcome = Document  # of a flight, as `outcome_of` of mechanisms.py returns it
+Rows = Sequence[Mapping[str, Outcome]]  # for each draw, the outcomes by key, as `fly_one` returns them
+Pair = tuple[Outcome, Outcome]  # outcomes (a, b) of a draw: a with the mechanism, b without it
 
 
-def document_of(seed: int, draws: int, rows: Outcomes, margins: list[Document]) -> Document:
-    """The document: a row for each mechanism. rows: outcomes of each case of `cases_of`, in order."""
+def document_of(seed: int, draws: int, rows: Rows, margins: list[Document]) -> Document:
+    """The document: the settings of the study, and the rows of margins, systems, mechanisms and false alarms.
+    It has passed if no false alarm of a worst-case scheme is unexplained. draws: in a cell; the document has
+    those of all cells. rows: of each case of `cases_of`, in order."""
     cases = cases_of(draws)
-    effects = [_row_of(mechanism, cases, rows) for mechanism in MECHANISMS]
     alarms = [_alarms_of(key, rows) for key in rows[0]]
     return {
         "passed": not any(row["unexplained"] for row in alarms if row["worst_case"]),
@@ -35,13 +37,13 @@ def document_of(seed: int, draws: int, rows: Outcomes, margins: list[Document]) 
         "worse": WORSE,
         "margins": margins,
         "systems": {system: _system_row([row[system] for row in rows]) for system in SYSTEMS},
-        "mechanisms": effects,
+        "mechanisms": [_row_of(mechanism, cases, rows) for mechanism in MECHANISMS],
         "false_alarms": alarms,
         "versions": dict(versions()),
     }
 
 
-def _row_of(mechanism: Mechanism, cases: Sequence[Flight], rows: Outcomes) -> Document:
+def _row_of(mechanism: Mechanism, cases: Sequence[Flight], rows: Rows) -> Document:
     """The row of a mechanism: its effect in all pairs, and by each value of each factor."""
     pairs = [(row[mechanism.with_key], row[mechanism.without_key]) for row in rows]
     by_factor = {
@@ -51,8 +53,13 @@ def _row_of(mechanism: Mechanism, cases: Sequence[Flight], rows: Outcomes) -> Do
         }
         for factor, values in FACTORS.items()
     }
-    about = {"system": mechanism.system, "mechanism": mechanism.name, "serves": mechanism.serves}
-    return {**about, **effect_of(pairs), "by": by_factor}
+    return {
+        "system": mechanism.system,
+        "mechanism": mechanism.name,
+        "serves": mechanism.serves,
+        **effect_of(pairs),
+        "by": by_factor,
+    }
 
 
 def effect_of(pairs: Sequence[Pair]) -> Document:
@@ -64,14 +71,14 @@ def effect_of(pairs: Sequence[Pair]) -> Document:
         "failed": len(pairs) - len(completed),
         "same_verdict": sum(a["verdict"] == b["verdict"] for a, b in completed),
         "same_tracking": sum(a["tracking_deg_s"] == b["tracking_deg_s"] for a, b in completed),
-        **{name: net(completed, worse) for name, worse in CRITERIA.items()},
+        **{name: net(completed, is_worse) for name, is_worse in CRITERIA.items()},
         "delay_s": _both([p for p in completed if not any(o["false_alarm"] for o in p)], "delay_s"),
         "tracking_deg_s": _both(completed, "tracking_deg_s"),
         "tracking_ratio": median(_ratio(a, b) for a, b in completed),
     }
 
 
-def _later(a: Document, b: Document) -> bool:
+def _later(a: Outcome, b: Outcome) -> bool:
     """Whether the alarm of b is later than that of a by more than LATE_S. False if one of them has a false
     alarm, which has no delay."""
     if a["false_alarm"] or b["false_alarm"]:
@@ -79,16 +86,16 @@ def _later(a: Document, b: Document) -> bool:
     return or_never(b["delay_s"]) > or_never(a["delay_s"]) + LATE_S
 
 
-CRITERIA: Mapping[str, Callable[[Document, Document], bool]] = {
+IsWorse = Callable[[Outcome, Outcome], bool]  # whether the second flight b of a pair is worse than a
+CRITERIA: Mapping[str, IsWorse] = {
     "false_alarms": lambda a, b: b["false_alarm"] > a["false_alarm"],
     "late": _later,
     "names": lambda a, b: a["named"] > b["named"],
     "tracking": lambda a, b: or_never(b["tracking_deg_s"]) > WORSE * or_never(a["tracking_deg_s"]),
 }
-"""By criterion, whether the second flight b of a pair is worse than the first a."""
 
 
-def net(pairs: Sequence[Pair], worse: Callable[[Document, Document], bool]) -> Document:
+def net(pairs: Sequence[Pair], is_worse: IsWorse) -> Document:
     """Share of pairs that are worse without the mechanism, less the share of those that are better.
 
     Each share has an exact interval with half of the error probability [ClopperPearson1934]. By the union
@@ -97,14 +104,15 @@ def net(pairs: Sequence[Pair], worse: Callable[[Document, Document], bool]) -> D
     """
     n = len(pairs)
     confidence = (1.0 + CONFIDENCE) / 2.0
-    lost, gained = sum(worse(a, b) for a, b in pairs), sum(worse(b, a) for a, b in pairs)
-    without, with_ = binomial(lost, n, confidence), binomial(gained, n, confidence)
+    n_worse = sum(is_worse(a, b) for a, b in pairs)
+    n_better = sum(is_worse(b, a) for a, b in pairs)
+    worse, better = binomial(n_worse, n, confidence), binomial(n_better, n, confidence)
     return {
-        "worse": lost,
-        "better": gained,
-        "value": (lost - gained) / n if n else 0.0,
-        "low": without.low - with_.high,
-        "high": without.high - with_.low,
+        "worse": n_worse,
+        "better": n_better,
+        "value": (n_worse - n_better) / n if n else 0.0,
+        "low": worse.low - better.high,
+        "high": worse.high - better.low,
     }
 
 
@@ -117,14 +125,14 @@ def _both(pairs: Sequence[Pair], name: str) -> Document:
     }
 
 
-def _ratio(a: Document, b: Document) -> float:
+def _ratio(a: Outcome, b: Outcome) -> float:
     """Tracking error of b over that of a; infinite if only b loses the aircraft, 0 if only a does, 1 if both
     do."""
     error_b, error_a = or_never(b["tracking_deg_s"]), or_never(a["tracking_deg_s"])
     return error_b / error_a if isfinite(error_a) else float(not isfinite(error_b))
 
 
-def _system_row(outcomes: Outcomes) -> Document:
+def _system_row(outcomes: Sequence[Outcome]) -> Document:
     """The row of a system with all of its mechanisms, over the completed flights."""
     completed = [o for o in outcomes if not o["failed"]]
     rates = {
@@ -140,19 +148,16 @@ def _system_row(outcomes: Outcomes) -> Document:
     }
 
 
-def _alarms_of(key: str, rows: Outcomes) -> Document:
-    """The false alarms of one system with or without a mechanism.
+def _alarms_of(key: str, rows: Rows) -> Document:
+    """The false alarms in the flights of one key.
 
-    worst_case: whether it guarantees no false alarm within the declaration; only the statistical detector
-    does not. undeclared: alarms with an undeclared error. certifiable: alarms of a scheme with certificates;
-    certified: those with one. unexplained: alarms without an undeclared error, or of a worst-case scheme with
-    certificates without one.
+    worst_case: whether their scheme guarantees no false alarm within the declaration; only the statistical
+    detector does not. undeclared: alarms with an undeclared error. certifiable: alarms of a scheme with
+    certificates; certified: those with one. unexplained: alarms without an undeclared error, or of a
+    worst-case scheme with certificates without one.
     """
     reasons = [row[key]["reason"] for row in rows if row[key]["false_alarm"]]
-    worst_case = key not in [
-        mechanism.with_key for mechanism in MECHANISMS if "fdi.statistical" in mechanism.present
-    ]
-    explained = [r["undeclared"] > 0 and (r["certified"] is not False or not worst_case) for r in reasons]
+    worst_case = not any(m.with_key == key and "fdi.statistical" in m.present for m in MECHANISMS)
     return {
         "flown": key,
         "worst_case": worst_case,
@@ -160,5 +165,5 @@ def _alarms_of(key: str, rows: Outcomes) -> Document:
         "undeclared": sum(reason["undeclared"] > 0 for reason in reasons),
         "certified": sum(bool(reason["certified"]) for reason in reasons),
         "certifiable": sum(reason["certified"] is not None for reason in reasons),
-        "unexplained": len(reasons) - sum(explained),
+        "unexplained": sum(r["undeclared"] == 0 or (worst_case and r["certified"] is False) for r in reasons),
     }

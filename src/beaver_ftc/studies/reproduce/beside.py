@@ -10,7 +10,8 @@ from beaver_ftc.results.model import Document
 from beaver_ftc.studies.present.tables import number
 from beaver_ftc.studies.reproduce.cases import AXIS, CASES, EDGES, HEALTHY, OURS, Changed, Flown, fly_case
 
-SHOWN = (HEALTHY, *(CASES[name] for name in ("elevator", "aileron", "rudder", "unanticipated")))
+FAULTY = ("elevator", "aileron", "rudder", "unanticipated")  # names of cases
+SHOWN = (HEALTHY, *(CASES[name] for name in FAULTY))
 WHOSE: Mapping[str, Mapping[str, object]] = {"paper": {}, "ours": OURS}
 BETTER = "Where the paper's is better, by more than 1 %:"
 MATTERS = 0.01  # a difference by a smaller share does not count

@@ -1,8 +1,9 @@
 """Fly the published study and judge its statements: the document, and its files.
 
-A setting is a change of the published setting (cases.py). For each setting, a row has the numbers of all
-measured claims, in the order of MEASURED, and the numbers in their ablations. The document has the verdicts
-that follow.
+A setting is a change of the published setting (cases.py). For each setting of the claims, a row has the
+numbers of all measured claims, in the order of MEASURED, and the numbers in their ablations. For each setting
+of a healthy flight (beside.py), a row has whether the flight raises a false alarm. The document has the
+verdicts that follow.
 """
 
 from collections import Counter
@@ -46,12 +47,13 @@ from beaver_ftc.studies.reproduce.published_figures import figures_of
 from beaver_ftc.studies.reproduce.words import NAME, as_html, as_markdown, as_text
 
 Rows = list[Document]
+Pair = tuple[float, float]  # number of a claim in a setting, and its number in the ablation
+BySetting = Mapping[str, list[Pair]]  # by name of the setting, the pair of each of MEASURED
 NUMBERS, ABLATED, SAME, FALSE_ALARM = "numbers", "without", "same", "false alarm"
 AS_PUBLISHED = Changed("as published", {})
 ELSEWHERE = (*BEYOND, *VARIANTS, *GAINS)  # settings that the paper did not fly
 SETTINGS = (AS_PUBLISHED, *ELSEWHERE)
 WITHOUT: Mapping[str, Changed] = {ablation.name: ablation for ablation in ABLATIONS}
-FAULTY = ("elevator", "aileron", "rudder", "unanticipated")
 NO_ADAPTATION = {"fdi.options.adaptation_gain": 0.0}  # of the isolation estimators
 STUDIED: tuple[tuple[str, Changed], ...] = (  # kind of the row, and setting
     *((NUMBERS, setting) for setting in SETTINGS),
@@ -70,8 +72,8 @@ def claims_row(setting: Changed) -> Document:
 
         numbers    the number of each of MEASURED
         without    the number of each in its ablation
-        same       in how many flights of FAULTY the adaptation of the isolation estimators changes neither
-                   the name nor the times of alarm and name
+        same       in how many flights of FAULTY (beside.py) the adaptation of the isolation estimators
+                   changes neither the name nor the times of alarm and name
 
     A number that no verdict needs is not flown. It is nan, which keeps no limit.
     """
@@ -79,21 +81,23 @@ def claims_row(setting: Changed) -> Document:
     flights = LazyFlights(setting.changes, flown_so_far)
     is_published = setting.name == AS_PUBLISHED.name
 
-    def without(claim: Claim) -> float:
+    def number_without(claim: Claim) -> float:
         return claim.number(LazyFlights({**setting.changes, **WITHOUT[claim.ablation].changes}, flown_so_far))
 
     unadapted = LazyFlights({**setting.changes, **NO_ADAPTATION}, flown_so_far)
     return {
         NUMBERS: [claim.number(flights) if is_published or not claim.because else nan for claim in MEASURED],
         ABLATED: [
-            without(claim) if is_published or (claim.testable and not claim.because) else nan
+            number_without(claim) if is_published or (claim.testable and not claim.because) else nan
             for claim in MEASURED
         ],
-        SAME: sum(_verdict_in(flights[name]) == _verdict_in(unadapted[name]) for name in FAULTY),
+        SAME: sum(
+            _times_and_name(flights[name]) == _times_and_name(unadapted[name]) for name in beside.FAULTY
+        ),
     }
 
 
-def _verdict_in(flight: Flown) -> tuple[float | None, str | None, float | None]:
+def _times_and_name(flight: Flown) -> tuple[float | None, str | None, float | None]:
     """Time of the alarm, name, and time of the name."""
     metrics = flight.metrics
     return metrics.detection.time_s, metrics.isolation.fault, metrics.isolation.time_s
@@ -105,21 +109,22 @@ def fly_published() -> dict[str, Flown]:
 
 
 def document_of(rows: Sequence[Document]) -> Summary:
-    """The document: the verdicts, and further flights for comparison. rows: of each setting of STUDIED, in
-    order. Behind the document are the flights of the published cases, by name."""
-    published = fly_published()
+    """The document, and behind it, for the figures, the flights of the published cases by name. rows: of each
+    setting of STUDIED, in order. The published cases, those with our scheme and law, and the designs are
+    flown here."""
+    flights = fly_published()
     settings = {
         setting.name: row for (kind, setting), row in zip(STUDIED, rows, strict=True) if kind == NUMBERS
     }
     pairs_of = {name: list(zip(row[NUMBERS], row[ABLATED], strict=True)) for name, row in settings.items()}
     claims = _claims(pairs_of)
-    counts = Counter(claim["verdict"] for claim in claims)
+    counts = Counter(row["verdict"] for row in claims)
     document = {
-        "passed": all(claim["verdict"] != NOT_BORNE_OUT or claim["because"] for claim in claims),
+        "passed": all(row["verdict"] != NOT_BORNE_OUT or row["because"] for row in claims),
         "counts": {verdict: counts[verdict] for verdict in VERDICTS},
         **_counted_apart(claims),
         "adaptation": {
-            "flights": len(FAULTY) * len(SETTINGS),
+            "flights": len(beside.FAULTY) * len(SETTINGS),
             "same": sum(row[SAME] for row in settings.values()),
         },
         "claims": claims,
@@ -135,18 +140,13 @@ def document_of(rows: Sequence[Document]) -> Summary:
             {
                 "case": case.name,
                 "shown_in": case.shown_in,
-                "metrics": published[case.name].metrics.document(),
+                "metrics": flights[case.name].metrics.document(),
             }
             for case in PUBLISHED
         ],
         "versions": dict(versions()),
     }
-    return Summary(document, published)
-
-
-Pairs = list[tuple[float, float]]
-"""(number, number in the ablation) of each of MEASURED in a setting."""
-BySetting = Mapping[str, Pairs]  # the pairs by name of the setting
+    return Summary(document, flights)
 
 
 def _claims(pairs_of: BySetting) -> Rows:
@@ -165,12 +165,13 @@ def _claims(pairs_of: BySetting) -> Rows:
     return rows
 
 
-def _judged(claim: Claim, by_setting: Mapping[str, tuple[float, float]]) -> Document:
-    """The row of a measured claim. by_setting: its pair of numbers by name of the setting. `lowest` and
+def _judged(claim: Claim, pair_of: Mapping[str, Pair]) -> Document:
+    """The row of a measured claim. pair_of: its pair of numbers by name of the setting. `lowest` and
     `highest` are over ELSEWHERE; a claim with `because` has only its number in the published setting."""
-    number, without = by_setting[AS_PUBLISHED.name]
-    elsewhere = [] if claim.because else [by_setting[setting.name] for setting in ELSEWHERE]
-    measure, verdict = claim.measure, claim.verdict(number, without, elsewhere)
+    number, number_without = pair_of[AS_PUBLISHED.name]
+    elsewhere = [] if claim.because else [pair_of[setting.name] for setting in ELSEWHERE]
+    measure = claim.measure
+    verdict = claim.verdict(number, number_without, elsewhere)
     everywhere = [n for n, _ in elsewhere] or [number]
     return {
         "measure": measure.name,
@@ -184,8 +185,8 @@ def _judged(claim: Claim, by_setting: Mapping[str, tuple[float, float]]) -> Docu
         "number": finite(number),
         "ablation": claim.ablation,
         "without": TAKES[claim.ablation],
-        "number_without": finite(without),
-        "fails_without": not claim.holds(without),
+        "number_without": finite(number_without),
+        "fails_without": not claim.holds(number_without),
         "construction": claim.construction,
         "lowest": finite(min(everywhere)),
         "highest": finite(max(everywhere)),
@@ -198,32 +199,30 @@ def _judged(claim: Claim, by_setting: Mapping[str, tuple[float, float]]) -> Docu
     }
 
 
-def _counted_apart(claims: Sequence[Document]) -> Document:
+def _counted_apart(claims: Rows) -> Document:
     """Counts of the statements that can be tested, with their verdicts; of those that are true by
-    construction; and of those without a measure."""
-    tested = Counter(c["verdict"] for c in claims if not c["reason"] and not c["construction"])
-    built = [c for c in claims if c["construction"]]
+    construction; and of those without a measure. claims: the rows of `_claims`."""
+    tested = Counter(row["verdict"] for row in claims if not row["reason"] and not row["construction"])
+    built = [row["verdict"] != NOT_BORNE_OUT for row in claims if row["construction"]]
     return {
         "testable": {
-            "statements": sum(tested.values()),
+            "statements": tested.total(),
             "hold": tested[STRONGER] + tested[BORNE_OUT],
             "elsewhere": tested[STRONGER],
             "do_not": tested[NOT_BORNE_OUT],
             "unsettled": tested[CANNOT_BE_JUDGED],
         },
-        "construction": {
-            "statements": len(built), "hold": sum(c["verdict"] != NOT_BORNE_OUT for c in built)
-        },
-        "background": sum(bool(c["reason"]) for c in claims),
-    }  # fmt: skip
+        "construction": {"statements": len(built), "hold": sum(built)},
+        "background": sum(bool(row["reason"]) for row in claims),
+    }
 
 
 def _ablations(claims: Rows) -> Rows:
     """A row for each ablation: its changes, how many statements refer to its mechanism, and how many fail
-    without it."""
+    without it. claims: the rows of `_claims`."""
     rows = []
     for ablation in ABLATIONS:
-        fails = [c["fails_without"] for c in claims if c.get("ablation") == ablation.name]
+        fails = [row["fails_without"] for row in claims if row.get("ablation") == ablation.name]
         rows.append({
             "ablation": ablation.name, "takes": TAKES[ablation.name], "changes": dict(ablation.changes),
             "statements": len(fails), "fail": sum(fails),
@@ -259,14 +258,14 @@ def _also_without(pairs_of: BySetting, setting: str) -> Rows:
     setting."""
     pairs = zip(MEASURED, pairs_of[setting], pairs_of[AS_PUBLISHED.name], strict=True)
     return [
-        _claim_row(c, without) | {"without": TAKES[c.ablation]}
-        for c, (number, without), (_, published) in pairs
-        if c.holds(number) and c.holds(without) and not c.holds(published)
+        _claim_row(claim, number_without) | {"without": TAKES[claim.ablation]}
+        for claim, (number, number_without), (_, published_without) in pairs
+        if claim.holds(number) and claim.holds(number_without) and not claim.holds(published_without)
     ]
 
 
 def _claim_row(claim: Claim, number: float) -> Document:
-    """A claim with its number in a setting."""
+    """A claim with its number in a setting, or in the ablation of a setting."""
     return {
         "where": claim.where,
         "statement": claim.statement,
@@ -280,9 +279,9 @@ def _missed(pairs_of: BySetting, setting: str) -> Rows:
     """The claims that hold in the published setting but not in this setting, with their numbers there."""
     pairs = zip(MEASURED, pairs_of[AS_PUBLISHED.name], pairs_of[setting], strict=True)
     return [
-        _claim_row(c, number)
-        for c, (published, _), (number, _) in pairs
-        if c.holds(published) and not c.holds(number)
+        _claim_row(claim, number)
+        for claim, (published_number, _), (number, _) in pairs
+        if claim.holds(published_number) and not claim.holds(number)
     ]
 
 
@@ -325,7 +324,7 @@ class Reproduce(StudyCommand):
         return "ablations, and changes to what the paper leaves open"
 
     def run(self, reporter: Reporter) -> Document:
-        """Fly the published cases, and all settings with their ablations."""
+        """Fly all settings with their ablations, then the other flights of the document."""
         study = Study(NAME, STUDIED, row_of, document_of, FILES)
         return run_into(study, self.out, self.processes, reporter.progress)
 

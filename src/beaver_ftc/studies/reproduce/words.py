@@ -46,13 +46,13 @@ def quantity_text(claim: Document) -> str:
 
 
 def limit(claim: Document) -> str:
-    """The limit that the number must keep."""
+    """The limit that the number must keep; that of a share in per cent, without its unit."""
     share = claim["unit"].startswith("of ")
     text = tables.number(100 * claim["limit"], "%") if share else tables.number(claim["limit"], claim["unit"])
     return f"{'at least' if claim['at_least'] else 'at most'} {text}"
 
 
-def without(claim: Document) -> str:
+def ablation_text(claim: Document) -> str:
     """The mechanism that is removed, and the number without it."""
     return f"{claim['without']}: {_number_text(claim, 'number_without')}"
 
@@ -65,7 +65,7 @@ def verdict_rows(document: Document) -> list[tuple[str, ...]]:
         else (
             claim["where"], claim["statement"], f"{', '.join(claim['flights'])}: {quantity_text(claim)}",
             f"{limit(claim)}: {claim['limit_from']}",
-            without(claim), verdict_words(claim), remark(claim),
+            ablation_text(claim), verdict_words(claim), remark(claim),
         )
         for claim in document["claims"]
     ]  # fmt: skip
@@ -132,16 +132,16 @@ def _changes(changes: Document) -> str:
     return "; ".join(f"{key}: {_value(value)}" for key, value in changes.items())
 
 
-ABLATIONS = (
+ABLATION_COLUMNS = (
     ("Taken out", "takes"), ("By", "changes", _changes), ("Statements that speak of it", "statements"),
     ("Fail without it", "fail"),
 )  # fmt: skip
-RANGES = (  # columns of a measured statement: `lowest` and `highest` of its row
+RANGE_COLUMNS = (  # columns of a measured statement: `lowest` and `highest` of its row
     ("Published", "where"), ("Statement", "statement"), ("From", partial(_number_text, key="lowest")),
     ("To", partial(_number_text, key="highest")), ("Held", "{held_in} of {elsewhere}".format_map),
 )  # fmt: skip
-CHOICES = (("Key", "key"), ("Value", "value", _value), ("Reason", "reason"))
-GAINS = (
+CHOICE_COLUMNS = (("Key", "key"), ("Value", "value", _value), ("Reason", "reason"))
+GAIN_COLUMNS = (
     ("Option", "key"), ("Default", "default", _value), ("What it is", "says"), ("Chosen by", "origin"),
     ("Halved: no longer hold", "halved", _sentences), ("Doubled: no longer hold", "doubled", _sentences),
 )  # fmt: skip
@@ -197,7 +197,7 @@ def as_text(document: Document, folder: str, colour: bool = False) -> str:
         summary(document), *(f"  except {sentence}" for sentence in exceptions(document)), "",
         printed([side_by_side], WIDTH, colour), "", beside.alarms_sentence(comparison), beside.BETTER,
         *(f"  {sentence}" for sentence in beside.sentences(comparison) or ["nowhere"]), "",
-        printed([designs], WIDTH, colour), "", f"page: {folder}/reproduction.html",
+        printed([designs], WIDTH, colour), "", f"page: {folder}/{NAME}.html",
     ]  # fmt: skip
     return "\n".join(lines)
 
@@ -213,11 +213,10 @@ def _table(document: Document) -> "Table":
         table.add_column(head)
     for claim in measured(document):
         cell = f"{quantity_text(claim)} ({limit(claim)})"
-        verdict = claim["verdict"]
         note = remark(claim)
         table.add_row(
-            claim["where"], claim["statement"], f"{cell}; {note}" if note else cell, without(claim),
-            Text(verdict_words(claim), _STYLE.get(verdict, "")),
+            claim["where"], claim["statement"], f"{cell}; {note}" if note else cell,
+            ablation_text(claim), Text(verdict_words(claim), _STYLE.get(claim["verdict"], "")),
         )  # fmt: skip
     return table
 
@@ -242,7 +241,7 @@ def _page(document: Document) -> list[page.Part]:
     return [
         _SAYS["introduction"], summary(document),
         page.Table(VERDICT_HEAD, verdict_rows(document), _GOOD),
-        _SAYS["ablations"], page.table(ABLATIONS, document["ablations"]),
+        _SAYS["ablations"], page.table(ABLATION_COLUMNS, document["ablations"]),
         page.Heading("Beside ours"), _SAYS["beside"],
         page.table(beside.COLUMNS, comparison["rows"]), beside.alarms_sentence(comparison),
         page.Bullets(beside.BETTER, beside.sentences(comparison) or ["nowhere"]),
@@ -253,10 +252,11 @@ def _page(document: Document) -> list[page.Part]:
         page.Pictures([(view.title, view.name) for view, _, _ in FIGURES]),
         page.Heading("What the conclusions hang on"), _SAYS["sensitivity"],
         page.Pictures([(_SAYS["margins"], SENSITIVITY)]),
-        page.table(RANGES, measured(document)),
+        page.table(RANGE_COLUMNS, measured(document)),
         *([page.Bullets("Where one does not:", sentences)] if sentences else []),
         f"The settings: {changes}.",
         page.Heading("What the paper leaves open"), _SAYS["gains"],
-        page.table(GAINS, document["gains"]), _SAYS["choices"], page.table(CHOICES, document["choices"]),
+        page.table(GAIN_COLUMNS, document["gains"]), _SAYS["choices"],
+        page.table(CHOICE_COLUMNS, document["choices"]),
         page.Bullets(_SAYS["deviations"], DEVIATIONS),
     ]  # fmt: skip

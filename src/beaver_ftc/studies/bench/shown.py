@@ -2,16 +2,9 @@
 
 from beaver_ftc.results.model import Document
 from beaver_ftc.studies.bench.sweep_flights import STAGES
-from beaver_ftc.studies.present.tables import Columns, aligned, tabulated
+from beaver_ftc.studies.present.tables import aligned
 
-SWEEP_FLIGHTS: Columns = (
-    ("", "kind"),
-    *((stage, f"parts_ms.{stage}", "{:.3f}".format) for stage in STAGES),
-    ("frames alone", "bare_ms", "{:.3f}".format),
-    ("frames, x", "frames_ratio", "{:.3f}".format),
-    ("flight, x", "flight_ratio", "{:.3f}".format),
-    ("us added a frame", "own_part_us", "{:.3f}".format),
-)
+_KIND_HEAD = ["", *STAGES, "frames alone", "frames, x", "flight, x", "us added a frame"]
 _ALTERNATIVES = {
     "straightforward": "properties by name, estimators in NumPy",
     "python_detector": "a detector in Python plugged in",
@@ -24,8 +17,6 @@ _ALTERNATIVES = {
 def text_of(document: Document) -> str:
     """The document of `bench` as text."""
     whole_flights = document["whole_flight"]
-    kinds = [{"kind": kind, **figures} for kind, figures in document["sweep_flights"].items()]
-    head, rows = tabulated(SWEEP_FLIGHTS, kinds)
     sections = {
         "after the alarm: every estimator, the network and the fault-tolerant law at work": _rows(document),
         "before the alarm": _rows(document["before_alarm"]),
@@ -42,8 +33,8 @@ def text_of(document: Document) -> str:
             ),
         ],
         "flights of 15 s in a sweep, ms of processor time; x: of what JSBSim alone takes for its frames": [
-            head,
-            *rows,
+            _KIND_HEAD,
+            *(_kind_row(kind, figures) for kind, figures in document["sweep_flights"].items()),
         ],
     }
     return "\n".join([
@@ -69,3 +60,9 @@ def _row(name: str, figures: Document, us: str = "us") -> list[str]:
     low, high = figures[f"{us}_quartiles"]
     adds = f"{figures['adds_us']:+.3f}" if "adds_us" in figures else ""
     return [name, f"{figures[us]:.3f}", f"[{low:.3f}, {high:.3f}]", f"{figures['ratio']:.3f} x", adds]
+
+
+def _kind_row(kind: str, figures: Document) -> list[str]:
+    """A row below _KIND_HEAD. figures: of `by_kind`."""
+    others = (figures[key] for key in ("bare_ms", "frames_ratio", "flight_ratio", "own_part_us"))
+    return [kind, *map("{:.3f}".format, (*figures["parts_ms"].values(), *others))]

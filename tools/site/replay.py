@@ -30,5 +30,5 @@ def page() -> str:
             marks=marks(Metrics.of(metrics)),
             start_s=metrics["fault"]["at_s"] - LEAD_S,
             span_s=SPAN_S,
-            **report.script_style_and_data([folder], [kept], shown=[VIEW]),
+            **report.script_style_and_data([folder], [Metrics.of(kept)], shown=[VIEW]),
         )

@@ -1,14 +1,14 @@
 """The report of one or more runs as one HTML file that needs nothing else: no network, no other file.
 
 The page draws the same views as the figures, from numbers of the log that it contains: the whole flight, and
-if that is thinned, also the time around the events with about 10 000 points. Its script (report.js) draws
-them. A plotting library would add one to four megabytes to every report, and has no marks, shades and mode
-bands like those of the figures.
+if that is thinned, also the time around the events with at most about 10 000 points. Its script (report.js)
+draws them. A plotting library would add one to four megabytes to every report, and has no marks, shades and
+mode bands like those of the figures.
 """
 
 import base64
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from functools import cache
 from pathlib import Path
@@ -39,8 +39,8 @@ results."""
 
 _TEMPLATE_FOLDER = Path(__file__).parent / "templates"
 AROUND_S = 2.5  # shown in detail before and after the closer view of the events, s
-AT_FULL_RATE = 10_000  # about the most points of each curve there: longer times are thinned, too
-_FLIGHT_PATH_COLUMNS = ("north_m", "east_m", "altitude_m", "phi_rad", "theta_rad", "psi_rad")
+MAX_DETAIL_POINTS = 10_000  # about the most points of each curve there: longer times are thinned, too
+_POSE_COLUMNS = ("north_m", "east_m", "altitude_m", "phi_rad", "theta_rad", "psi_rad")
 
 
 def write_report(
@@ -64,49 +64,49 @@ def render(folders: Sequence[Path], names: Sequence[str] = (), sections: Sequenc
     from markupsafe import Markup
 
     documents = [json.loads((folder / "metrics.json").read_text(encoding="utf-8")) for folder in folders]
-    last_marks = {mark.name: mark for document in documents for mark in marks(Metrics.of(document))}.values()
+    all_metrics = [*map(Metrics.of, documents)]
+    last_marks = {mark.name: mark for metrics in all_metrics for mark in marks(metrics)}.values()
     return template(_TEMPLATE_FOLDER / "report.html.j2").render(
-        runs=list(map(_verdict_entry, documents, folders)),
+        runs=list(map(_verdict_entry, all_metrics, folders)),
         names=names,
         modes=MODE_COLOURS,
         marks=last_marks,
         first_mark_s=next((mark.time_s for mark in last_marks), 0.0),
-        **script_style_and_data(folders, documents, names),
+        **script_style_and_data(folders, all_metrics, names),
         sections=[Markup(section(folder)) for folder in folders for section in sections],
     )
 
 
-def _verdict_entry(document: Document, folder: Path) -> Document:
-    """The verdict of a run as the template shows it. document: its metrics."""
+def _verdict_entry(metrics: Metrics, folder: Path) -> Document:
+    """The verdict of a run as the template shows it."""
     import yaml
 
-    records = Metrics.of(document)
     scenario = (folder / "scenario.yaml").read_text(encoding="utf-8")
     return {
-        "metrics": document,
-        "title": verdict.title(records),
-        "outcome_class": verdict.outcome_class(records),
+        "metrics": metrics,
+        "title": verdict.title(metrics),
+        "outcome_class": verdict.outcome_class(metrics),
         "description": yaml.safe_load(scenario).get("description", ""),
-        "facts": verdict.verdict_lines(records),
-        "tracking": verdict.tracking_rms_in_words(records),
-        "expectations": expectations_in_words(records),
+        "facts": verdict.verdict_lines(metrics),
+        "tracking": verdict.tracking_rms_in_words(metrics),
+        "expectations": expectations_in_words(metrics),
         "scenario": scenario,
     }
 
 
 def script_style_and_data(
     folders: Sequence[Path],
-    documents: Sequence[Document],
+    all_metrics: Sequence[Metrics],
     names: Sequence[str] = (),
     shown: Sequence[View] | None = None,
 ) -> Document:
     """Script, style and data of a page that replays flights.
 
-    documents: their metrics. shown: the views on the page, None for all that the flights have in common.
+    all_metrics: of each flight. shown: the views on the page, None for all that the flights have in common.
     """
     from markupsafe import Markup
 
-    data = json.dumps(_page_data(folders, documents, names, shown), allow_nan=False, separators=(",", ":"))
+    data = json.dumps(_page_data(folders, all_metrics, names, shown), allow_nan=False, separators=(",", ":"))
     return {
         "data": Markup(data.replace("<", "\\u003c")),  # it cannot end the script element it stands in
         "css": _asset_text("report.css"),
@@ -116,7 +116,7 @@ def script_style_and_data(
 
 def _page_data(
     folders: Sequence[Path],
-    documents: Sequence[Document],
+    all_metrics: Sequence[Metrics],
     names: Sequence[str],
     shown: Sequence[View] | None,
 ) -> Document:
@@ -125,12 +125,11 @@ def _page_data(
     shown: the views on the page, None for all that the runs have in common.
     """
     logs = [log.StoredLog(folder / "log.parquet") for folder in folders]
-    all_metrics = [Metrics.of(document) for document in documents]
     shown = _common_views(logs, all_metrics) if shown is None else shown
     columns = tuple(
-        dict.fromkeys([*_FLIGHT_PATH_COLUMNS, "mode", *(name for view in shown for name in view.columns)])
+        dict.fromkeys([*_POSE_COLUMNS, "mode", *(name for view in shown for name in view.columns)])
     )
-    # fewer points of each curve the more runs there are: the page stays within a few megabytes
+    # the more runs, the fewer points of each curve, so that the page has a few megabytes; 600 still show it
     points = MAX_CURVE_POINTS if len(logs) <= 2 else max(600, 2 * MAX_CURVE_POINTS // len(logs))
     runs = zip(logs, all_metrics, names or [run_metrics.scenario for run_metrics in all_metrics], strict=True)
     return {
@@ -161,11 +160,12 @@ def _run_entry(source: log.Log, metrics: Metrics, columns: Sequence[str], name: 
     t_s = levels[0]["t_s"]
     if window and t_s.size < source.row_count():
         around = window[0] - AROUND_S, window[1] + AROUND_S
-        levels.append(series_of(source, columns, around, AT_FULL_RATE))
+        levels.append(series_of(source, columns, around, MAX_DETAIL_POINTS))
     return {
         "name": name,
         "jet": not {"spoiler", "stabiliser"}.isdisjoint(surfaces_by_kind(surfaces(source.columns))),
         "damage": [
+            # a case such as left-wing-tip-off takes the part off
             {"part": fault.size["case"].removesuffix("-off"), "at_s": fault.at_s, "end_s": fault.end_s}
             for fault in metrics.faults
             if fault.type == "damage"
@@ -206,6 +206,11 @@ def template(path: Path) -> "Template":
     """The template of a page, by its file."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-    options: Mapping[str, Any] = {"autoescape": True, "trim_blocks": True, "lstrip_blocks": True}
-    pages = Environment(loader=FileSystemLoader(path.parent), undefined=StrictUndefined, **options)
+    pages = Environment(
+        loader=FileSystemLoader(path.parent),
+        undefined=StrictUndefined,
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
     return pages.get_template(path.name)

@@ -2,7 +2,6 @@
 page of the other days made of them (`other_days`)."""
 
 from collections.abc import Callable
-from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +9,16 @@ import numpy as np
 
 from beaver_ftc.results import SERIES_COLOURS as SERIES
 from beaver_ftc.results import Document, as_json
-from beaver_ftc.studies.present import GRID, Files, aligned, markdown_table, marker, panels, replace_between
+from beaver_ftc.studies.present import (
+    GRID,
+    Files,
+    aligned,
+    markdown_table,
+    marker,
+    panels,
+    replace_between,
+    tabulated,
+)
 from beaver_ftc_logs.energy import ENGINE
 from beaver_ftc_logs.recorded.benchmark import LABEL_TITLES
 
@@ -18,7 +26,6 @@ from beaver_ftc_logs.recorded.benchmark import LABEL_TITLES
 HeaderAndRows = tuple[list[str], list[list[str]]]
 # Function from a row of the document to the text of a cell.
 Cell = Callable[[Document], str]
-_METHOD: Cell = itemgetter("method")
 _SHOWN_DELAY_S = 30.0  # longer delays share one place at the right of the figure
 
 
@@ -38,25 +45,21 @@ def score_tables(document: Document) -> list[tuple[str, HeaderAndRows]]:
     tables = []
     for data in document["sets"]:
         columns = LABEL_COLUMNS if data["scored_by"] == "labels" else FAILURE_COLUMNS
-        rows = [[cell_of(row) for cell_of in columns.values()] for row in (*data["rows"], *data["published"])]
-        tables.append((f"{data['set']}: left out, {data['left_out']}", ([*columns], rows)))
+        table = tabulated(columns, [*data["rows"], *data["published"]])
+        tables.append((f"{data['set']}: left out, {data['left_out']}", table))
     return tables
 
 
 def _tables_of_other_days(document: Document) -> list[tuple[str, HeaderAndRows]]:
     """A title and a table for each data set: every day with one change, then mean and worst of each kind."""
-    columns = LABEL_COLUMNS | {
-        "method": itemgetter("day"),
-        "classes by sliding least squares": _share("beside"),
-    }
+    columns = (("day", "day"), *LABEL_SHARES, ("classes by sliding least squares", _share("beside")))
     tables = []
     for data in document["sets"]:
         days = [day for day in data["rows"] if day["kind"] == "one change"]
         for summary in data["summary"]:
             days += [summary[key] | {"day": f"{summary['kind']}: {key}"} for key in ("mean", "worst")]
-        rows = [[cell_of(day) for cell_of in columns.values()] for day in days]
         title = f"{data['set']}: other days made of it, each part left out in turn"
-        tables.append((title, (["day", *[*columns][1:]], rows)))
+        tables.append((title, tabulated(columns, days)))
     return tables
 
 
@@ -91,25 +94,28 @@ def _soon_text(row: Document) -> str:
     return " of ".join(str(sum(delay[key] for delay in delays)) for key in ("within_5_s", "failures"))
 
 
-# Tables of methods: header of a column -> function from the row of a method to the cell.
-LABEL_COLUMNS = {"method": _METHOD} | {title: _share(key) for key, title in LABEL_TITLES.items()}
-FAILURE_COLUMNS = {
-    "method": _METHOD,
-    "precision": _share("precision"),
-    "recall": _share("recall"),
-    "accuracy": _share("accuracy"),
-    "mean delay, s: aileron": _delay("aileron"),
-    "rudder": _delay("rudder"),
-    "elevator": _delay("elevator"),
-    "ailerons and rudders within 5 s": _ours(_soon_text),
-    "false alarms an hour (95 %)": _ours(
-        lambda row: "{value:.1f} ({low:.1f} to {high:.1f})".format(**row["false_alarms_per_hour"])
+# Columns of tables: (header, key of the text in a row, or function from a row to the text).
+LABEL_SHARES = tuple((title, _share(key)) for key, title in LABEL_TITLES.items())
+LABEL_COLUMNS = (("method", "method"), *LABEL_SHARES)
+FAILURE_COLUMNS = (
+    ("method", "method"),
+    ("precision", _share("precision")),
+    ("recall", _share("recall")),
+    ("accuracy", _share("accuracy")),
+    ("mean delay, s: aileron", _delay("aileron")),
+    ("rudder", _delay("rudder")),
+    ("elevator", _delay("elevator")),
+    ("ailerons and rudders within 5 s", _ours(_soon_text)),
+    (
+        "false alarms an hour (95 %)",
+        _ours(lambda row: "{value:.1f} ({low:.1f} to {high:.1f})".format(**row["false_alarms_per_hour"])),
     ),
-    "healthy flights with an alarm": _ours(
-        lambda row: f"{row['healthy_flights_with_an_alarm']} of {row['healthy_flights']}"
+    (
+        "healthy flights with an alarm",
+        _ours(lambda row: f"{row['healthy_flights_with_an_alarm']} of {row['healthy_flights']}"),
     ),
-    "wrong group": _ours(lambda row: str(row["wrong_group"])),
-}
+    ("wrong group", _ours(lambda row: str(row["wrong_group"]))),
+)
 
 
 def as_text(document: Document) -> str:

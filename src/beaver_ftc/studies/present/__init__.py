@@ -18,6 +18,6 @@ if TYPE_CHECKING:
         versions_line,
         write_files,
     )
-    from beaver_ftc.studies.present.tables import aligned, finite, markdown_table, number
+    from beaver_ftc.studies.present.tables import aligned, finite, markdown_table, number, tabulated
 else:
     __getattr__, __dir__ = lazily(__name__)

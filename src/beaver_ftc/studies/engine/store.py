@@ -45,8 +45,8 @@ class Parts:
             replace_whole(self._path(batch), lambda file: self.codec.write(rows, file))
 
     def landed(self, batch: int | str, runs: Sequence[int]) -> Any:
-        """The rows of a batch; None if it has no file. A file that cannot be read is set aside, and gives
-        None, too."""
+        """The rows of a batch; None if it has no file. A file that cannot be read, or has other rows,
+        is set aside, and gives None, too."""
         path = self._path(batch)
         rows = None
         if path.exists():

@@ -29,7 +29,8 @@ def all_finite(row: Mapping[str, Any]) -> Document:
 
 def number(value: Any, unit: str = "", none: str = "-", digits: int = 3) -> str:
     """A number with so many significant digits, or all digits before the point, without an exponent, and its
-    unit. None and an empty text are `none`; another text stays as it is."""
+    unit. None and an empty text are `none`; another text stays as it is. An infinite number, and NaN, is
+    `never`, followed by the unit."""
     if value is None or isinstance(value, str):
         return value or none
     return f"{_digits(float(value), digits)} {unit}".rstrip()
@@ -80,7 +81,7 @@ class Column(NamedTuple):
     """A column of a table: its head, and its cell of a row.
 
     of: a function from a row to its cell, or the key of a value in the row; `part.key` is a key inside a
-    part. form: a function from the value to its cell, or the unit of a number.
+    part. form, of the value of a key: a function from the value to its cell, or the unit of a number.
     """
 
     head: str

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from beaver_ftc.studies.sweep.outcomes import Flights
 
 OnLanded = Callable[[Number, Any], None]  # takes the number and the rows of each batch, once it has landed
-FRAMES_A_BATCH = 50_000  # a third of a second of work: little is lost, and writing a file costs little of it
+FRAMES_A_BATCH = 50_000  # a lost batch is little work, and writing a file costs little of it
 MOST_A_BATCH = 256  # flights in a batch, unless there would be more than MOST_BATCHES
 MOST_BATCHES = 4_000  # so many files are read again in seconds
 
@@ -48,7 +48,7 @@ class Options:
       Ray, number of tasks, two for each CPU by default. backend: `local` or `ray`. address: of the Ray
       cluster.
     - resume: whether to continue an earlier sweep. keep: which flights leave a folder of their own. report:
-      whether figures and report are written.
+      whether figures and report are written; a worst flight that is kept has a report of its own in any case.
     - search: the objective of a worst-case search, or None. source: the sweep file, as the command line names
       it.
     """
@@ -143,7 +143,8 @@ def _rounds(sweep: Sweep, options: Options, store: Store) -> Iterable[Round]:
 
 
 def _workers(sweep: Sweep, options: Options, flights: int) -> Workers:
-    """The workers of the backend."""
+    """The workers of the backend. flights: number of missing flights; the number of workers does not depend
+    on it."""
     work = Work(partial(one_flight.fly_one, sweep, keep=options.keep), partial(one_flight.warm_up, sweep))
     if options.backend == "ray":
         from beaver_ftc.studies.engine.ray_workers import RayWorkers
@@ -155,7 +156,10 @@ def _workers(sweep: Sweep, options: Options, flights: int) -> Workers:
 def conclude(sweep: Sweep, options: Options, store: Store) -> Document:
     """Write the results of a complete `results.parquet`: the worst flights if they are to be kept, figures
     and report; `summary.json` last, since it marks a finished sweep. Raises SimulationFailed if no flight
-    could be flown."""
+    could be flown.
+
+    sweep, options: as `run_sweep` has changed them, with the name and the folder of the kept flights.
+    """
     from beaver_ftc.studies.sweep.outcomes import Flights
 
     flights = Flights(store.results, sweep)
@@ -200,8 +204,8 @@ def _draw(flights: "Flights", document: Document, store: Store) -> None:
 
 
 def assignment_of(sweep: Sweep, options: Options, index: int) -> Assignment:
-    """The values of one flight of a sweep, or of a generation of a search that has begun. Raises BadInput for
-    any other flight."""
+    """The values of one flight of a sweep, or of a generation of a search that has begun. sweep: with the
+    name of `named_for`. Raises BadInput for any other flight."""
     if not 0 <= index < sweep.flights:
         raise BadInput(f"{sweep.name}: there is no flight {index}, allowed: 0 to {sweep.flights - 1}")
     for batches, cases_of in _rounds(sweep, options, Store(options.out / sweep.name, sweep)):
@@ -220,7 +224,7 @@ def replay(sweep: Sweep, options: Options, index: int) -> Document:
     folder = options.out / sweep.name
     scenario = one_flight.scenario_of(sweep, assignment_of(sweep, options, index))
     document = run(scenario, folder / "flights", options.report, certified=options.keep.certified)
-    if (folder / "report.html").exists():  # written again with a link to the flight
+    if (folder / "report.html").exists():
         summary = read_json(folder / "summary.json")
         Store(folder, sweep).write("report.html", render(summary, folder))
     return document | {"folder": str(folder / "flights" / scenario.name)}

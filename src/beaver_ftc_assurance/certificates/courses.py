@@ -222,6 +222,7 @@ def _exclude_rate_limit(bounds: SurfaceBounds) -> Document | None:
             if reached > max(upper, near) + MIN_POSITION_DIFFERENCE_RAD:
                 fields = {"ordered": orders[i : k + 1].tolist(), "near": near}
                 fields |= {"step": min_approach} if k - i > 1 else {}
+                # the last pair is always met: it belongs to the format of the certificate
                 pairs = [*_positive_pairs(beyond, run), (reached, upper), (reached, near), (1.0, 0.0)]
                 return bounds.statement(run, i, pairs, fields, axis)
     return None
@@ -268,14 +269,9 @@ def _surface_bounds(
 ) -> SurfaceBounds:
     """The bounds of the frames from the alarm on in which the diagnosis has tested types. held: hypothesis by
     which a frame bounds the position: theta is the position p, its offset is -G u and its slope G, so that
-    the command is u = -offset / slope.
-
-    reach (n, 2): least and greatest position of a healthy surface in each frame. orders (n, 3): largest
-    orders to the surface, from the row after each frame; in a frame of one instant only the last column is in
-    effect, otherwise the last two.
+    the command is u = -offset / slope. sign: 1 or -1, by which positions are multiplied.
     """
     frames = np.arange(alarm_frame, tape.end - 1)
-    has_instants = not history.has_single_instants
     diagnosis = tape.last.diagnosis
     tape_rows = slice(alarm_frame - tape.first, tape.end - 1 - tape.first)
     lower, upper, _ = theta_bounds_by_frame(held, history, frames)
@@ -284,18 +280,21 @@ def _surface_bounds(
     slope = held.slope[tape_rows]
     axis_commands = -sign * held.offset[tape_rows] / np.where(slope == 0.0, np.inf, slope)
     command = axis_commands[:, np.abs(slope).sum(axis=0).argmax()]
-    reach = (
-        np.column_stack([tape.least[tape_rows, surface, 0], tape.greatest[tape_rows, surface, 0]])[:, ::sign]
-        * sign
-    )
-    command_range = np.maximum(0.0, (command[:, None] - reach) * (1.0, -1.0)) * has_instants
+    # least and greatest position of a healthy surface in each frame (n, 2)
+    reach = np.column_stack([tape.least[tape_rows, surface, 0], tape.greatest[tape_rows, surface, 0]])
+    reach = (sign * reach)[:, ::sign]
+    # in a frame of one instant, the commands have no range
+    single = history.has_single_instants
+    command_range = np.maximum(0.0, (command[:, None] - reach) * (1.0, -1.0)) * (not single)
+    # largest orders to the surface (n, 3), from the row after each frame: in a frame of one instant only the
+    # last one is in effect, otherwise the last two
     orders = (tape.command_high if sign > 0 else -tape.command_low)[
         tape_rows.start + 1 : tape_rows.stop + 1, surface
     ]
     return SurfaceBounds(
         alarm_frame, sign, lower, upper, command, axis_commands, command_range,
         is_unexplained=history.is_unexplained(frames),
-        max_order=np.maximum(orders[:, 2], orders[:, 1 if has_instants else 2]),
+        max_order=orders[:, 2 if single else 1 :].max(axis=1),
         stops=np.sort(sign * np.array(travel_rad(tape, surface))), held=held,
         actuator=diagnosis.surface_fault_types[surface].actuator, config=diagnosis.types_config,
         slowest_rad_s=scenario.fdi.slowest_oscillation_rad_s,

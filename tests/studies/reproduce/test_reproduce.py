@@ -116,9 +116,9 @@ def test_numbers_agree_with_the_log_itself():
     assert tracked == pytest.approx(np.linalg.norm(error) / np.sqrt(error.size) / 3.0)
 
 
-@pytest.mark.parametrize("whose", beside.WHOSE)
-def test_no_false_alarm_at_the_corners_and_edges_of_the_published_uncertainty(whose):
-    settings = [setting for asked, setting in beside.healthy_settings() if asked == whose]
+@pytest.mark.parametrize("flown_by", beside.FLOWN_BY)
+def test_no_false_alarm_at_the_corners_and_edges_of_the_published_uncertainty(flown_by):
+    settings = [setting for asked, setting in beside.healthy_settings() if asked == flown_by]
     thetas = [setting.changes["uncertainty.inertia_coupling"] for setting in settings]
     assert len({tuple(theta.values()) for theta in thetas}) == 27
     assert {value for theta in thetas for value in theta.values()} == {-0.25, 0.0, 0.25}

@@ -7,14 +7,16 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 
 from beaver_ftc.results.model import Document
-from beaver_ftc.studies.present.tables import number
+from beaver_ftc.studies.engine.statistics import or_never
+from beaver_ftc.studies.present.tables import number, percent
 from beaver_ftc.studies.reproduce.cases import AXIS, CASES, EDGES, HEALTHY, OURS, Changed, Flown, fly_case
 
 FAULTY = ("elevator", "aileron", "rudder", "unanticipated")  # names of cases
 SHOWN = (HEALTHY, *(CASES[name] for name in FAULTY))
-WHOSE: Mapping[str, Mapping[str, object]] = {"paper": {}, "ours": OURS}
-BETTER = "Where the paper's is better, by more than 1 %:"
+# Who flies a case, and the changes of its scenario.
+FLOWN_BY: Mapping[str, Mapping[str, object]] = {"paper": {}, "ours": OURS}
 MATTERS = 0.01  # a difference by a smaller share does not count
+BETTER = f"Where the paper's is better, by more than {percent(MATTERS)}:"
 # Numbers whose smaller value is better: key in a row, name, unit.
 QUANTITIES = (
     ("detected_s", "detection after", "s"), ("isolated_s", "isolation after", "s"),
@@ -24,15 +26,19 @@ QUANTITIES = (
 
 
 def fly_both() -> dict[tuple[str, str], Flown]:
-    """The flights of each case of SHOWN with both schemes, by (case, whose)."""
-    return {(case.name, whose): fly_case(case, changes) for case in SHOWN for whose, changes in WHOSE.items()}
+    """The flights of each case of SHOWN with both schemes, by (case, flown_by)."""
+    return {
+        (case.name, flown_by): fly_case(case, changes)
+        for case in SHOWN
+        for flown_by, changes in FLOWN_BY.items()
+    }
 
 
 def healthy_settings() -> list[tuple[str, Changed]]:
-    """(whose, setting) for each of EDGES."""
+    """(flown_by, setting) for each of EDGES."""
     return [
-        (whose, Changed(corner.name, {**changes, **corner.changes}))
-        for whose, changes in WHOSE.items()
+        (flown_by, Changed(corner.name, {**changes, **corner.changes}))
+        for flown_by, changes in FLOWN_BY.items()
         for corner in EDGES
     ]
 
@@ -45,25 +51,25 @@ def false_alarm_of(setting: Changed) -> float:
 def document_of(flights: Mapping[tuple[str, str], Flown], alarms: Sequence[float]) -> Document:
     """The document: a row for each case and scheme, and the false alarms of each scheme. alarms: 1 or 0 for
     each of `healthy_settings`, in their order."""
-    rows = [_row(case, whose, flight) for (case, whose), flight in flights.items()]
+    rows = {place: _row(*place, flight) for place, flight in flights.items()}
     settings = zip(healthy_settings(), alarms, strict=True)
-    alarmed = Counter(whose for (whose, _), alarm in settings if alarm)
+    alarmed = Counter(flown_by for (flown_by, _), alarm in settings if alarm)
     return {
-        "rows": rows,
+        "rows": list(rows.values()),
         "healthy_flights": len(EDGES),
-        "false_alarms": {whose: alarmed[whose] for whose in WHOSE},
+        "false_alarms": {flown_by: alarmed[flown_by] for flown_by in FLOWN_BY},
         "paper_better": _better(rows),
     }
 
 
-def _row(case: str, whose: str, flight: Flown) -> Document:
+def _row(case: str, flown_by: str, flight: Flown) -> Document:
     """The row of a flight. case: its name; the healthy case has no axis of its own and is shown in pitch."""
     metrics = flight.metrics
     axis = AXIS.get(case, "q")
     tracking = metrics.tracking
     return {
         "case": case,
-        "flown_by": whose,
+        "flown_by": flown_by,
         "scheme": metrics.flight.scheme,
         "law": metrics.flight.law,
         "detected_s": metrics.detection.delay_s,
@@ -78,11 +84,9 @@ def _row(case: str, whose: str, flight: Flown) -> Document:
     }
 
 
-def _better(rows: Sequence[Document]) -> list[Document]:
+def _better(rows: Mapping[tuple[str, str], Document]) -> list[Document]:
     """The numbers that are better with the scheme and law of the paper, unless the aircraft is lost with
-    these."""
-    # `fly_both` has each case with the paper's scheme first, then with ours
-    pairs = zip(rows[::2], rows[1::2], strict=True)
+    these. rows: by (case, flown_by)."""
     return [
         {
             "case": paper["case"],
@@ -91,16 +95,10 @@ def _better(rows: Sequence[Document]) -> list[Document]:
             "paper": paper[key],
             "ours": ours[key],
         }
-        for paper, ours in pairs
+        for paper, ours in ((rows[case.name, "paper"], rows[case.name, "ours"]) for case in SHOWN)
         for key, name, unit in QUANTITIES
-        if not paper["departed"] and _less(paper[key], ours[key])
+        if not paper["departed"] and or_never(paper[key]) < (1.0 - MATTERS) * or_never(ours[key])
     ]
-
-
-def _less(paper: float | None, ours: float | None) -> bool:
-    """Whether the number of the paper is smaller by more than the share `MATTERS`; None is larger than any
-    number."""
-    return paper is not None and (ours is None or paper < (1.0 - MATTERS) * ours)
 
 
 def _after(row: Document) -> str:

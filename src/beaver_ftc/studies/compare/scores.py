@@ -3,14 +3,15 @@ document of the comparison, from which tables, figure and page are made.
 """
 
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from math import inf
-from operator import itemgetter
 
 from beaver_ftc.results.metrics import versions
 from beaver_ftc.results.model import Document
-from beaver_ftc.studies.compare.replay import Trace, alarms_at
-from beaver_ftc.studies.compare.trial import LAW, ORACLE, SCHEME, STATISTICAL, Entry, Result, Trial
+from beaver_ftc.studies.compare.replay import Trace
+from beaver_ftc.studies.compare.rivals import better_than_ours, who_is_better
+from beaver_ftc.studies.compare.trade_off import matched, trade_off
+from beaver_ftc.studies.compare.trial import LAW, ORACLE, SCHEME, Entry, Result, Trial
 from beaver_ftc.studies.engine.statistics import (
     CONFIDENCE,
     duel,
@@ -20,7 +21,7 @@ from beaver_ftc.studies.engine.statistics import (
     wilson,
     wilson_bound,
 )
-from beaver_ftc.studies.present.tables import all_finite, finite, percent
+from beaver_ftc.studies.present.tables import all_finite, finite
 
 Results = Sequence[Result]  # of one entry, in the order of the flights
 
@@ -30,8 +31,8 @@ def line_of(entry: Entry, results: Results, oracle: Results, ours: Results = ())
     order. ours: the same of our entry, or nothing to compare with. Flights that failed with an error are only
     in `failed`. ratio: tracking error over that of the oracle, where the oracle has one.
 
-    The delay of an event that never comes is infinite, and so is a quantile of nothing. None: a rate in no
-    flight.
+    The delay of an event that never comes is infinite, and so are a quantile of nothing and an upper bound in
+    no time. None: a rate in no flight, or in no time.
     """
     pairs = [(mine, best) for mine, best in zip(results, oracle, strict=True) if mine.error is None]
     completed = [mine for mine, _ in pairs]
@@ -66,7 +67,7 @@ def _false_alarms(completed: Results) -> Document:
         "false_alarms": alarms,
         "healthy_h": hours,
         "false_alarms_per_h": alarms / hours if hours else None,
-        "false_alarms_per_h_upper": poisson_bound(alarms, hours, CONFIDENCE, upper=True) if hours else None,
+        "false_alarms_per_h_upper": poisson_bound(alarms, hours, CONFIDENCE, upper=True),
     }
 
 
@@ -118,59 +119,6 @@ def _results(trials: Iterable[Trial], entry: Entry) -> list[Result]:
     return [result for trial in trials for result in trial.results if result.entry == entry]
 
 
-def trade_off(traces: Sequence[Trace]) -> list[Document]:
-    """The points at each level at which the number of false alarms changes, and at level 1, with which the
-    scheme ships; from the highest level to the lowest."""
-    levels = sorted({1.0, *(trace.before for trace in traces if trace.before > 0.0)}, reverse=True)
-    return [point_at(traces, level) for level in levels]
-
-
-def point_at(traces: Sequence[Trace], level: float) -> Document:
-    """False alarms and detections of a scheme at a level of its statistic.
-
-    Detections and delays are counted in the flights without a false alarm before the fault. None: a rate in
-    no flight, or in no time.
-    """
-    alarms, hours = alarms_at(traces, level)
-    delays = [trace.delay_s(level) for trace in traces if trace.faulted and not trace.false_alarm(level)]
-    return {
-        "level": level,
-        "false_alarms_per_h": alarms / hours if hours else None,
-        "detection_rate": sum(delay < inf for delay in delays) / len(delays) if delays else None,
-        "delay_median_s": share_within(delays, 0.5),
-    }
-
-
-def matched(points: Sequence[Document]) -> Document | None:
-    """The most sensitive level without a false alarm; None if no alarm could have been false."""
-    return min((p for p in points if p["false_alarms_per_h"] == 0.0), key=itemgetter("level"), default=None)
-
-
-# The keys of a line in which `better_than_ours` compares rivals with ours, and their names.
-MATCHED = {"detection_rate": "detection rate", "delay_median_s": "median detection delay, s"}
-COMPARED = {
-    "false_alarms_per_h": "false alarms per hour",
-    **MATCHED,
-    "delay_90_s": "90 % detection delay, s",
-    "isolation_rate": "isolation accuracy",
-}
-TRACKING = {
-    "ratio_median": "median tracking ratio to the oracle",
-    "ratio_90": "90 % tracking ratio to the oracle",
-    "departures": "departures",
-}
-EFFORT = {
-    "before_median": "median error before the fault, deg/s",
-    "before_90": "90 % error before the fault, deg/s",
-    "after_median": "median error after the fault, deg/s",
-    "after_90": "90 % error after the fault, deg/s",
-    "travel_median": "median travel of the surfaces, deg/s",
-    "energy_median": "median energy of the surfaces, deg2/s2",
-}
-MORE_IS_BETTER = ("detection_rate", "isolation_rate")
-SIGNIFICANT = 0.05
-
-
 def document_of(trials: Sequence[Trial], entries: Sequence[Entry]) -> Document:
     """Tally every set; numbers that do not exist are null. entries: among them our scheme with our law, and
     with the oracle."""
@@ -202,101 +150,3 @@ def _set_document(trials: Sequence[Trial], entries: Sequence[Entry]) -> Document
         "better_than_ours": better_than_ours(lines, without_false_alarm),
         "errors": sorted({error for trial in trials for error in trial.failures} | failed),
     }
-
-
-# Schemes and laws that are no rivals: yardsticks, and variants and parts of ours.
-NO_RIVALS = ("none", STATISTICAL, ORACLE, "oracle-published", "fault-tolerant-published")
-
-
-def competitors(lines: Sequence[Document]) -> tuple[dict[str, Document], dict[str, Document]]:
-    """The lines of our scheme and its rivals with our law, and of our law and its rivals with our scheme, by
-    name."""
-    schemes = {row["scheme"]: row for row in lines if row["law"] == LAW and row["scheme"] not in NO_RIVALS}
-    laws = {row["law"]: row for row in lines if row["scheme"] == SCHEME and row["law"] not in NO_RIVALS}
-    return schemes, laws
-
-
-def who_is_better(lines: Sequence[Document]) -> Document:
-    """A sentence about the schemes, and one about the laws: the best of them, with intervals and
-    significance. Empty if no flight has a fault."""
-    if not any(row["faults"] for row in lines):
-        return {}
-    schemes, laws = competitors(lines)
-    return {
-        "schemes": leader(schemes, SCHEME, "detection_rate", "Faults detected", percent, more_is_better=True),
-        "laws": leader(
-            laws, LAW, "ratio_median", "Tracking error over the oracle's, median", "{:.2f}".format,
-            more_is_better=False,
-        ),
-    }  # fmt: skip
-
-
-def leader(
-    rows: Mapping[str, Document], ours: str, key: str, title: str, cell: Callable[[float], str],
-    more_is_better: bool,
-) -> str:  # fmt: skip
-    """One sentence that compares the best rival with ours, each number with its interval. If their numbers
-    are equal, it names all rivals that equal ours.
-
-    rows: our line and those of the rivals, by name, each with the duel `against_ours`. ours: our name. key:
-    of the number; the keys `<key>_low` and `<key>_high` are its interval. title: its name. cell: its format.
-    """
-    sign = -1.0 if more_is_better else 1.0
-    badness = {name: inf if row.get(key) is None else sign * row[key] for name, row in rows.items()}
-    texts = {name: f"{name} {_with_interval(row, key, cell)}" for name, row in rows.items()}
-    rivals = [name for name in rows if name != ours]
-    if not rivals:
-        return f"{title}: {texts[ours]}."
-    best = min(rivals, key=badness.__getitem__)
-    if badness[best] == badness[ours]:
-        equals = [name for name in rivals if badness[name] == badness[ours]]
-        return f"{title}: {ours} and {', '.join(equals)} are equally good: {texts[ours]}."
-    duel = rows[best]["against_ours"]
-    wins = {best: duel["better"], ours: duel["worse"]}
-    first, second = sorted(wins, key=badness.__getitem__)
-    doubt = "" if duel["p"] < SIGNIFICANT else ", so this may be chance"
-    return (
-        f"{title}: {texts[first]} is better than {texts[second]}; wins: {wins[first]} against "
-        f"{wins[second]}, p = {duel['p']:.2g}{doubt}."
-    )
-
-
-def _with_interval(row: Document, key: str, cell: Callable[[float], str]) -> str:
-    """A number of a line and its interval."""
-    value, low, high = (
-        missing if row.get(key + end) is None else cell(row[key + end])
-        for end, missing in (("", "none"), ("_low", "no limit"), ("_high", "no limit"))
-    )
-    return f"{value} ({low} to {high})"
-
-
-def better_than_ours(lines: Sequence[Document], free: Document) -> list[str]:
-    """One sentence for each number in which a rival is better than ours.
-
-    lines: among them that of our entry. free: by scheme, the point at its most sensitive level without a
-    false alarm, if there is one.
-    """
-    schemes, laws = competitors(lines)
-    ours = schemes[SCHEME]
-    sentences = [s for name, row in schemes.items() for s in _better(row, ours, COMPARED | TRACKING, name)]
-    sentences += [
-        f"with no false alarm, {sentence}"
-        for scheme, point in free.items()
-        if scheme in schemes and SCHEME in free
-        for sentence in _better(point, free[SCHEME], MATCHED, scheme)
-    ]
-    return sentences + [s for name, row in laws.items() for s in _better(row, ours, TRACKING | EFFORT, name)]
-
-
-def _better(row: Document, ours: Document, compared: Mapping[str, str], name: str) -> Iterator[str]:
-    """The sentences of one rival. None is the worst value of each number, an infinite delay or an unknown
-    rate, and printed as `never`. Our own row is never better than itself."""
-    for key, name_of_number in compared.items():
-        value = row.get(key)
-        our_value = ours.get(key)
-        if value is None:
-            continue
-        sign = 1 if key in MORE_IS_BETTER else -1
-        if our_value is None or sign * value > sign * our_value + 1e-9:
-            our_text = "never" if our_value is None else f"{our_value:.3g}"
-            yield f"{name} has the better {name_of_number}: {value:.3g} against {our_text}"

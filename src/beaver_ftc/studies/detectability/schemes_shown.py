@@ -10,7 +10,7 @@ import numpy as np
 
 from beaver_ftc.results.model import Document
 from beaver_ftc.results.style import SERIES
-from beaver_ftc.studies.compare.scores import leader
+from beaver_ftc.studies.compare.rivals import leader
 from beaver_ftc.studies.detectability.probabilities import (
     JUDGED_S,
     SIGNIFICANT,
@@ -106,9 +106,7 @@ def who_is_better(
                 }
                 rows[scheme] = rates | {"against_ours": duel}
         if BOTH in rows:
-            yield leader(
-                rows, BOTH, "rate", f"{surface}, found within {soon} s", percent, more_is_better=True
-            )
+            yield leader(rows, BOTH, "rate", f"{surface}, found within {soon} s", percent)
 
 
 def comparison(document: Document) -> list[str]:

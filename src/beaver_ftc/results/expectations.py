@@ -4,6 +4,8 @@ An expectation fails if its quantity does not exist, for example if there was no
 absence. A name that was given before its fault began meets no expectation. A failed expectation of the
 diagnosis has a reason if the name was premature or withdrawn, or if there were frames in which the diagnosis
 could conclude nothing.
+
+The functions at the end write values and times for all words of a flight.
 """
 
 from collections.abc import Iterator
@@ -257,3 +259,16 @@ def three_digits(value: float) -> str:
     """A number of three significant digits, without an exponent from 0.0001 to a million: 1230, not
     1.23e+03."""
     return f"{float(f'{value:.3g}'):g}"
+
+
+def span_text(begin_s: float, end_s: float | None) -> str:
+    """A span of time, s; only the begin if it has no end."""
+    begin = seconds_text(begin_s)
+    return begin if end_s is None else f"{begin} to {seconds_text(end_s)}"
+
+
+def seconds_text(seconds: float | None) -> str:
+    """A time as text, with one digit less from 1000 s on."""
+    if seconds is None:
+        return "none"
+    return f"{seconds:.2f} s" if seconds < 1000 else f"{seconds:.1f} s"

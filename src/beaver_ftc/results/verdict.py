@@ -4,60 +4,38 @@ All words are computed from the metrics, so that they cannot disagree with metri
 is a pair (name, text); without a text, it is left out.
 """
 
-import io
-import math
 import re
-from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Sequence
+from typing import Any
 
 from beaver_ftc.results.expectations import (
     MOTION_OF_AXIS,
     expectations_in_words,
+    seconds_text,
+    span_text,
     value_text,
-    without_underscores,
 )
+from beaver_ftc.results.fault_words import fault_text, isolation_texts, window_text
 from beaver_ftc.results.model import (
     Authority,
     CertificateCounts,
     ChangeInFlight,
-    DeclaredFault,
-    Fault,
     FlightCondition,
     Link,
     Metrics,
-    Named,
     Part,
     ProfileDeviations,
     ProtectionLimit,
     Statistical,
-    Window,
-    Withdrawn,
 )
-from beaver_ftc.scenario.faults import TYPES, acting_at, masking, size_at
+from beaver_ftc.results.terminal import printed, verdict_table
 from beaver_ftc.scenario.measured_range import in_words
-from beaver_ftc.scenario.sensors import QUANTITIES
 from beaver_ftc.scenario.warnings import wider
-
-if TYPE_CHECKING:
-    from rich.table import Table
 
 MIN_SHOWN_BEYOND_S = 0.1  # a shorter time without sufficient authority is not printed
 MAX_SHOWN_AUTHORITY_SHARE = 0.995  # an axis with a larger share has lost nothing worth saying
-MAX_LISTED_CANDIDATES = 4  # more surfaces are counted, not listed
 _TIME = re.compile("(?<!_deg|_rad)_s$")  # names of fields in seconds, without rates
 _ASSUMPTION_TEXT = {"sensors-sound": "sensors are sound (A11)"}
-Lines = Iterable[tuple[str, str]]  # name and text
-# Candidates that are no surface, in words.
-_TEXT_OF_OTHER_CANDIDATE = {
-    "damage": "damage", "unanticipated": "a fault outside the class", "unknown": "a fault outside the class",
-}  # fmt: skip
-# Words in the names of surfaces, and the part of the aircraft where such a surface is.
-_AIRCRAFT_PART_OF_SURFACE_WORD = {
-    "aileron": "wing", "flap": "wing", "spoiler": "wing", "slat": "wing", "elevon": "wing",
-    "elevator": "tail", "rudder": "tail", "stabilator": "tail", "stabilizer": "tail", "canard": "canard",
-    "throttle": "engines", "engine": "engines",
-}  # fmt: skip
 
 
 def title(metrics: Metrics) -> str:
@@ -79,10 +57,10 @@ def outcome_class(metrics: Metrics) -> str:
 def verdict_lines(metrics: Metrics) -> list[tuple[str, str]]:
     """(name, text) of each line of the verdict, from top to bottom."""
     declared = metrics.faults or (metrics.fault,)
-    isolation = metrics.isolation
+    probing_s = metrics.isolation.probing_s
     lines = (
         ("flight", _if_there(_condition_text, metrics.flight)),
-        *headed("fault", [_fault_text(fault, metrics.faults) for fault in declared]),
+        *headed("fault", [fault_text(fault, metrics.faults) for fault in declared]),
         ("assumed", ", ".join(_ASSUMPTION_TEXT.get(name, name) for name in metrics.assumes)),
         ("outside", _outside_class_text(metrics)),
         ("detection", _detection_text(metrics)),
@@ -91,16 +69,9 @@ def verdict_lines(metrics: Metrics) -> list[tuple[str, str]]:
             _if_there(lambda section: in_words(section.document()), metrics.detection.inconclusive),
         ),
         ("statistical", _if_there(_statistical_text, metrics.detection.statistical)),
-        ("isolation", _isolation_text(metrics)),
-        *(
-            ("", _found_text(fault, metrics, _candidates_text(fault.candidates)))
-            for fault in (isolation.faults[1:] if isolation.isolated else ())
-        ),
-        *headed("windows", [_window_text(window, metrics) for window in metrics.windows or ()]),
-        (
-            "probing",
-            f"flap and elevator moved from {_span_text(*isolation.probing_s)}" if isolation.probing_s else "",
-        ),
+        *headed("isolation", isolation_texts(metrics)),
+        *headed("windows", [window_text(window, metrics) for window in metrics.windows or ()]),
+        ("probing", f"flap and elevator moved from {span_text(*probing_s)}" if probing_s else ""),
         ("supervisor", _supervisor_text(metrics)),
         *(("changed", _change_text(change)) for change in metrics.changes),
         (
@@ -118,7 +89,7 @@ def verdict_lines(metrics: Metrics) -> list[tuple[str, str]]:
         ("envelope", _envelope_text(metrics)),
         ("departure", _filled("LOST at {time_s}: {signal}", metrics.departure)),
         ("link", _if_there(_link_text, metrics.link)),
-        ("saturation", ", ".join(f"{s} {_seconds_text(t)}" for s, t in metrics.saturation_s.items() if t)),
+        ("saturation", ", ".join(f"{s} {seconds_text(t)}" for s, t in metrics.saturation_s.items() if t)),
         *(("note", hint) for hint in metrics.hints),
     )
     return [(name, text) for name, text in lines if text]
@@ -140,59 +111,9 @@ def _filled(form: str, section: Part | None, **more: str) -> str:
     if section is None:
         return ""
     values = {
-        name: _seconds_text(value) if _TIME.search(name) else value for name, value in vars(section).items()
+        name: seconds_text(value) if _TIME.search(name) else value for name, value in vars(section).items()
     }
     return form.format(**values, **more)
-
-
-def _window_text(window: Window, metrics: Metrics) -> str:
-    """The alarm and the names in one window."""
-    alarm = f"alarm after {_seconds_text(window.delay_s)}" if window.detected else "no alarm"
-    names = [_found_text(name, metrics, "not isolated") for name in window.isolation]
-    return _filled("{from_s} to {to_s}: {found}", window, found="; ".join([alarm, *names]))
-
-
-def _found_text(named: Named, metrics: Metrics, otherwise: str) -> str:
-    """A named fault, or else the candidates; `otherwise` if there are no candidates."""
-    if named.fault:
-        return _named_fault_text(named, metrics)
-    return _candidates_text(named.candidates) if named.candidates else otherwise
-
-
-def _candidates_text(candidates: Sequence[str]) -> str:
-    return f"not isolated, {candidates_in_words(candidates)}"
-
-
-def candidates_in_words(candidates: Sequence[str]) -> str:
-    """The candidates, each `place` or `place:type`, in words: first the surfaces, then other places, then the
-    types. More than MAX_LISTED_CANDIDATES surfaces are counted; the metrics document lists all."""
-    places: dict[str, list[str]] = {}
-    for candidate in candidates:
-        place, _, kind = candidate.partition(":")
-        places.setdefault(place, []).extend([kind] if kind else [])
-    surfaces = [place for place, kinds in places.items() if place not in _TEXT_OF_OTHER_CANDIDATE]
-    words = [_surfaces_text(surfaces)] if surfaces else []
-    words += [_TEXT_OF_OTHER_CANDIDATE[place] for place in places if place in _TEXT_OF_OTHER_CANDIDATE]
-    open_types = list(dict.fromkeys(kind for kinds in places.values() for kind in kinds))
-    types = f"; {_open_types_text(open_types)}" if open_types else ""
-    return f"still possible: {' or '.join(words) or 'nothing'}{types}"
-
-
-def _surfaces_text(names: Sequence[str]) -> str:
-    """The names of a few surfaces, or the number of many on each part of the aircraft."""
-    if len(names) <= MAX_LISTED_CANDIDATES:
-        return " or ".join(without_underscores(name) for name in names)
-    part_of = _AIRCRAFT_PART_OF_SURFACE_WORD.items()
-    parts = Counter(next((part for word, part in part_of if word in name), "others") for name in names)
-    counted = ", ".join(f"{n} {'' if part == 'others' else 'on the '}{part}" for part, n in parts.items())
-    return f"one of {len(names)} surfaces ({counted})"
-
-
-def _open_types_text(kinds: Sequence[str]) -> str:
-    """The types that remain, counted."""
-    if len(kinds) == 1:
-        return f"type {without_underscores(kinds[0])}"
-    return f"type not determined ({len(kinds)} remain: {', '.join(map(without_underscores, kinds))})"
 
 
 def _count_and_noun(n: int, noun: str) -> str:
@@ -210,11 +131,10 @@ def tracking_rms_in_words(metrics: Metrics) -> list[tuple[str, str, str, str]]:
 def verdict_text(metrics: Metrics, folder: str, colour: bool = False) -> str:
     """The verdict of one flight as a table for the terminal."""
     style = {"good": "bold green", "lost": "bold yellow", "bad": "bold red"}[outcome_class(metrics)]
-    lines = verdict_lines(metrics)
     errors = [
         f"p {p}  q {q}  r {r} deg/s {when} the fault" for when, p, q, r in tracking_rms_in_words(metrics)
     ]
-    lines += headed("tracking RMS", errors)
+    lines = verdict_lines(metrics) + headed("tracking RMS", errors)
     expectations = [
         (expectation.passed, expectation.sentence) for expectation in expectations_in_words(metrics)
     ]
@@ -222,40 +142,6 @@ def verdict_text(metrics: Metrics, folder: str, colour: bool = False) -> str:
     last_lines = [("certificate", _certificate_text(folder, written))] if written else []
     table = verdict_table((title(metrics), style), lines, expectations, [*last_lines, ("results", folder)])
     return f"{printed([table], colour=colour)}\n"
-
-
-def verdict_table(
-    headline: tuple[str, str], lines: Lines, expectations: Iterable[tuple[bool, str]], last: Lines
-) -> "Table":
-    """The table of a verdict: headline (text, style), lines, expectations (met, sentence), and the last
-    lines."""
-    from rich.table import Table
-    from rich.text import Text
-
-    table = Table(title=Text(*headline), title_justify="left", show_header=False, box=None)
-    table.add_column(style="bold", no_wrap=True)
-    table.add_column(overflow="fold")
-    for name, text in lines:
-        table.add_row(name, text)
-    for passed, sentence in expectations:
-        mark = Text("met   " if passed else "MISSED", "green" if passed else "bold red")
-        table.add_row("expected", Text.assemble(mark, f" {sentence}"))
-    for name, text in last:
-        table.add_row(name, text)
-    return table
-
-
-def printed(tables: Iterable["Table"], width: int | None = None, colour: bool = False) -> str:
-    """Tables of rich as text."""
-    from rich.console import Console
-
-    console = Console(
-        file=io.StringIO(), force_terminal=colour, highlight=False, emoji=False, markup=False, width=width
-    )
-    with console.capture() as captured:
-        for table in tables:
-            console.print(table)
-    return "\n".join(line.rstrip() for line in captured.get().splitlines())
 
 
 def _certificate_text(folder: str, written: CertificateCounts) -> str:
@@ -299,44 +185,6 @@ def _outside_class_text(metrics: Metrics) -> str:
     return f"{outside}: outside the declared class, so that it cannot be named; {cure}"
 
 
-def _fault_text(fault: Fault | None, faults: Sequence[DeclaredFault]) -> str:
-    """A fault with its size and times, and the times at which other faults mask it. A `Fault`, of documents
-    of earlier versions, has neither size nor end."""
-    if fault is None:
-        return "none"
-    place = f"sensor {fault.sensor}" if fault.sensor else fault.actuator or ""
-    text = f"{place} {without_underscores(fault.type)}".strip()
-    if not isinstance(fault, DeclaredFault):
-        return f"{text} at {_seconds_text(fault.at_s)}"
-    if size := ", ".join(_fault_size_texts(fault)):
-        text += f" ({size})"
-    return f"{text} at {_span_text(fault.at_s, fault.end_s)}{_masked_text(fault, faults)}"
-
-
-def _masked_text(fault: DeclaredFault, faults: Sequence[DeclaredFault]) -> str:
-    """The times at which a later fault masks a fault, so that it has no effect."""
-    masks = [
-        other for other in faults if other.at_s > fault.at_s and masking(fault, faults, other.at_s) is other
-    ]
-    spans = [
-        f"from {_span_text(other.at_s, other.end_s)} ({without_underscores(other.type)})" for other in masks
-    ]
-    return f", without effect {' and '.join(spans)}" if spans else ""
-
-
-_FORM_OF_SENSOR_FAULT = {"bias": "{:+g} {}", "noise": "{:g} {}", "scale": "{:+.0%}"}
-
-
-def _fault_size_texts(fault: DeclaredFault) -> list[str]:
-    """The size of an injected fault in words. The fault of an instrument has the unit of the instrument."""
-    if fault.sensor:
-        unit = QUANTITIES[fault.sensor].unit
-        size = fault.size.get("magnitude")
-        return [] if size is None else [_FORM_OF_SENSOR_FAULT[fault.type].format(size, unit)]
-    words_of = TYPES[fault.type].in_words if fault.type in TYPES else {}
-    return [words_of[key](value) for key, value in fault.size.items() if key in words_of]
-
-
 _DEVIATION_FORMAT_OF_CHANNEL = {
     "altitude_m": "altitude {} m",
     "airspeed_mps": "airspeed {} m/s (10 s mean; largest at one instant {})", "heading_deg": "heading {} deg",
@@ -367,35 +215,6 @@ def _protection_limit_text(limit: ProtectionLimit) -> str:
     return _filled(_LIMIT_FORM_OF_QUANTITY[limit.limits], limit, until=until)
 
 
-def _true_size_text(isolation: Named, metrics: Metrics) -> str:
-    """The true size at the time of the estimate, if a fault of the named type was injected on this surface
-    and has a size.
-
-    The time of the estimate is `estimate_at_s`, or else the last frame. This time is written unless the only
-    fault of the surface is abrupt and lasts to the end, and the estimate belongs to the last frame. No text
-    if the size may change and the time is unknown.
-    """
-    faults = [fault for fault in metrics.faults if fault.actuator == isolation.fault]
-    kind = isolation.type
-    if isolation.estimate is None or kind not in [fault.type for fault in faults]:
-        return ""
-    condition = metrics.flight
-    at_s = isolation.estimate_at_s
-    if at_s is None:
-        at_s = condition.flown_s - 1.0 / condition.rate_hz if condition and condition.rate_hz else math.inf
-    lasts = faults[0].end_s is None and faults[0].profile == "abrupt" and len(faults) == 1
-    if math.isinf(at_s) and not lasts:
-        return ""
-    when = "" if lasts and isolation.estimate_at_s is None else f" at {_seconds_text(at_s)}"
-    size = size_at(kind, faults, at_s)
-    if size is None:
-        is_over = kind not in [fault.type for fault in acting_at(faults, at_s)]
-        return f"{when} (the fault is over then)" if is_over else when
-    if isolation.estimate_deg is None:
-        return f"{when} (true {TYPES[str(kind)].size_in_words(size)})"
-    return f"{when} (true {value_text(math.degrees(size))} deg)"
-
-
 def _detection_text(metrics: Metrics) -> str:
     """When an alarm was raised, and by which test: the residual of an axis, or the sensor monitor."""
     detection = metrics.detection
@@ -412,7 +231,7 @@ def _detection_text(metrics: Metrics) -> str:
 
 def _statistical_text(statistical: Statistical) -> str:
     """When the statistical detector alone would have raised the alarm."""
-    alarm = "no alarm" if statistical.time_s is None else f"alarm at {_seconds_text(statistical.time_s)}"
+    alarm = "no alarm" if statistical.time_s is None else f"alarm at {seconds_text(statistical.time_s)}"
     return _filled(
         "{alarm}; threshold {alarm_level:.2f} σ, peak in healthy flight {closest_approach:.2f} of it",
         statistical,
@@ -420,71 +239,9 @@ def _statistical_text(statistical: Statistical) -> str:
     )
 
 
-def _isolation_text(metrics: Metrics) -> str:
-    """The name, the candidates or `none`; then the names and types that were withdrawn."""
-    isolation = metrics.isolation
-    text = "none"
-    if isolation.isolated:
-        text = _named_fault_text(isolation, metrics)
-    elif metrics.detection.detected and isolation.candidates:
-        text = _candidates_text(isolation.candidates)
-    withdrawn = _withdrawn_texts("named before", isolation.withdrawn)
-    return "; ".join(
-        [text, *withdrawn, *_withdrawn_texts("type named before", isolation.types_withdrawn or ())]
-    )
-
-
-def _withdrawn_texts(heading: str, withdrawn: Sequence[Withdrawn]) -> list[str]:
-    """The withdrawn names, each once, in a text below the heading: how often it was given if several times,
-    and for how long in all, from when to when, and the reason of the last withdrawal. No text without a
-    name."""
-    entries_of_name: dict[str, list[Withdrawn]] = {}
-    for entry in withdrawn:
-        kind = f" ({without_underscores(entry.type)})" if entry.type else ""
-        entries_of_name.setdefault(f"{entry.fault}{kind}", []).append(entry)
-    texts = []
-    for name, entries in entries_of_name.items():
-        total = _seconds_text(sum(entry.to_s - entry.from_s for entry in entries))
-        often = f" {len(entries)} times, for {total} in all," if len(entries) > 1 else ""
-        when = f"from {_span_text(entries[0].from_s, entries[-1].to_s)}"
-        why = f", withdrawn because {entries[-1].because}" if entries[-1].because else ""
-        texts.append(f"{name}{often} {when}{why}")
-    return [f"{heading}: {'; '.join(texts)}"] if texts else []
-
-
-def _named_fault_text(isolation: Named, metrics: Metrics) -> str:
-    """One named fault: its name, the delay, whether it is right or premature, type, estimated and true
-    size."""
-    remaining = " (only remaining candidate)" if isolation.so_far else ""  # later data may exclude it, too
-    when = "" if isolation.delay_s is None else f" after {_seconds_text(isolation.delay_s)}"
-    right = "correct" if isolation.correct and isolation.type_correct is not False else "WRONG"
-    if isolation.premature:
-        right = f"PREMATURE at {_seconds_text(isolation.time_s)}"
-    size = _estimate_text(isolation) + _true_size_text(isolation, metrics)
-    return f"{isolation.fault}{remaining}{when}; {right}{_type_text(isolation)}{size}"
-
-
-def _type_text(isolation: Named) -> str:
-    """The type, or the types that remain. No text for an instrument, and for the type `unanticipated`."""
-    if str(isolation.fault).startswith("sensor "):
-        return ""
-    if isolation.type is None:
-        return ", " + (_open_types_text(isolation.candidates) if isolation.candidates else "of no known type")
-    return "" if isolation.type == "unanticipated" else f", {without_underscores(isolation.type)}"
-
-
-def _estimate_text(isolation: Named) -> str:
-    """The estimated size: an angle in deg, any other size in the words of its fault type."""
-    if isolation.estimate is None:
-        return ""
-    if isolation.estimate_deg is None:
-        return f", estimated {TYPES[str(isolation.type)].estimate_in_words(isolation.estimate)}"
-    return f", estimated {value_text(isolation.estimate_deg)} deg"
-
-
 def _supervisor_text(metrics: Metrics) -> str:
     """The modes with their times; before the last one, how many are left out."""
-    changes = [f"{change.mode} {_seconds_text(change.time_s)}" for change in metrics.supervisor]
+    changes = [f"{change.mode} {seconds_text(change.time_s)}" for change in metrics.supervisor]
     if metrics.mode_changes_left_out:
         changes.insert(-1, f"({metrics.mode_changes_left_out} more)")
     return " → ".join(changes)
@@ -494,7 +251,7 @@ def _insufficient_authority_text(authority: Authority) -> str:
     """For how long no deflection could hold the rate of each axis; times below MIN_SHOWN_BEYOND_S are left
     out."""
     beyond = ", ".join(
-        f"{axis} for {_seconds_text(entry.beyond_s)}"
+        f"{axis} for {seconds_text(entry.beyond_s)}"
         for axis, entry in vars(authority).items()
         if entry.beyond_s >= MIN_SHOWN_BEYOND_S
     )
@@ -528,7 +285,7 @@ def _envelope_text(metrics: Metrics) -> str:
         "left {times}, {outside_s} in all, first at {first}",
         metrics.envelope,
         times=_count_and_noun(metrics.envelope.exits, "time"),
-        first=_seconds_text(metrics.envelope_exits[0].start_s),
+        first=seconds_text(metrics.envelope_exits[0].start_s),
     )
 
 
@@ -551,16 +308,3 @@ def _link_text(link: Link) -> str:
         link,
         odd=odd,
     )
-
-
-def _span_text(begin_s: float, end_s: float | None) -> str:
-    """A span of time, s; only the begin if it has no end."""
-    begin = _seconds_text(begin_s)
-    return begin if end_s is None else f"{begin} to {_seconds_text(end_s)}"
-
-
-def _seconds_text(seconds: float | None) -> str:
-    """A time as text, with one digit less from 1000 s on."""
-    if seconds is None:
-        return "none"
-    return f"{seconds:.2f} s" if seconds < 1000 else f"{seconds:.1f} s"

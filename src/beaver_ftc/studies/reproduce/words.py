@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from beaver_ftc.documents.document import parse
 from beaver_ftc.results.model import Document
-from beaver_ftc.results.verdict import printed
+from beaver_ftc.results.terminal import printed
 from beaver_ftc.studies.present import page, tables
 from beaver_ftc.studies.present.tables import tabulated
 from beaver_ftc.studies.reproduce import beside, truth_and_design

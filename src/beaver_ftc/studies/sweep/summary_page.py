@@ -12,7 +12,8 @@ from pathlib import Path
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.results.hints import NEAR_THRESHOLD_SHARE
 from beaver_ftc.results.model import Document, Expectation, Judged
-from beaver_ftc.results.verdict import headed, printed, verdict_table
+from beaver_ftc.results.terminal import printed, verdict_table
+from beaver_ftc.results.verdict import headed
 from beaver_ftc.studies.present.page import (
     Heading,
     Links,

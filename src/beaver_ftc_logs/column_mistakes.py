@@ -89,8 +89,10 @@ def refuse_rate_unit(samples: Samples, ranges: FittedRanges) -> None:
         if unit not in (None, "rad/s"):
             to_si = SI_UNITS[unit][1]
             text = hint.format(to_si=to_si, from_si=1.0 / to_si, unit=unit)
-            motion = f"rates spread {ratio:.3g} times as widely as in the flights of the model"
-            raise BadInput(f"{samples.name}: {motion}, allowed: rates in rad/s; {text}")
+            raise BadInput(
+                f"{samples.name}: rates spread {ratio:.3g} times as widely as in the flights of the model, "
+                f"allowed: rates in rad/s; {text}"
+            )
 
 
 def refuse_command_unit(flight: Samples, first: Samples, surfaces: Sequence[str]) -> None:
@@ -116,9 +118,10 @@ def refuse_command_unit(flight: Samples, first: Samples, surfaces: Sequence[str]
 
 def _relative_motion(values: Floats, reference: Sequence[Sequence[float]]) -> Floats:
     """Width of the central range of each column of values (n, S) over that of the reference ranges, (S,)."""
-    ranges = central_ranges(values), reference
-    spans = [np.ptp(np.array(pairs).reshape(-1, 2), axis=1) for pairs in ranges]
-    return spans[0] / np.maximum(spans[1], MIN_DIVISOR)
+    spans, usual_spans = (
+        np.ptp(np.array(pairs).reshape(-1, 2), axis=1) for pairs in (central_ranges(values), reference)
+    )
+    return spans / np.maximum(usual_spans, MIN_DIVISOR)
 
 
 # Key: kind of the mistake (_COMMAND_MISTAKES), and name of the group. Value: motion of the command over that
@@ -169,14 +172,14 @@ def refuse_columns(samples: Samples, model: Model) -> None:
     if measured is None:
         return
     mistakes = _lasting_mistakes(samples, model, measured)
-    texts = [
+    texts = (
         _COMMAND_MISTAKES[kind].format(group=group, motion=motion, gain=gain)
         for (kind, group), (motion, gain) in mistakes.items()
-    ]
-    text = texts[0] if texts else _likelier_mistake(flight, own_model)
-    if text is not None:
-        allowed = "allowed: columns, signs and units as in the flights of the model"
-        raise BadInput(f"{samples.name}: {text}, {allowed}")
+    )
+    if text := next(texts, None) or _likelier_mistake(flight, own_model):
+        raise BadInput(
+            f"{samples.name}: {text}, allowed: columns, signs and units as in the flights of the model"
+        )
 
 
 def _lasting_mistakes(samples: Samples, model: Model, measured: Answers) -> CommandMistakes:

@@ -17,7 +17,7 @@ from beaver_ftc_logs.recording import MIN_DIVISOR, Floats, Ints
 from beaver_ftc_logs.runs import runs_between
 
 # Floor of the eigenvalues of X' X. `fit_ols` takes those that are smaller, over the largest, as 0;
-# `Innovations.gain_bounds` adds the floor times the number of rows to each.
+# `coefficient_bounds` adds the floor times the number of rows to each.
 EIGENVALUE_FLOOR = 1e-10
 _RANK_TOLERANCE = 1e-12  # a column or an eigenvalue that is smaller, over the largest, is rounding
 # Median of the chi-squared law with three degrees of freedom.
@@ -64,6 +64,26 @@ def fit_ols(Z: Floats, y: Floats, stretch: Ints, lag: int) -> Regression:
     inflation = np.divide(coloured, white, out=np.ones_like(coloured), where=white > 0)
     d = np.sqrt(np.maximum(np.diag(P), MIN_DIVISOR))
     return Regression(b / s[:, None], R, coloured / s[:, None], inflation, P / np.outer(d, d))
+
+
+def coefficient_bounds(Z: Floats, y: Floats, share: float, margin: float) -> tuple[Floats, Floats, float]:
+    """Lower and upper bound on each coefficient of Z, (m,) each, and `noise_scale` of the residual. The rows
+    of Z (3 n, m) and y (3 n,) are whitened, three a sample.
+
+        P = (X' X + eps 3 n I)^-1,   b = P X' y,   e = y - X b
+        bounds = (b -+ margin sqrt(diag(P) mean(e^2) / share)) / s
+
+    eps: EIGENVALUE_FLOOR; it keeps the bounds finite, and far apart, where the columns depend on one another.
+    share: number of white samples that have the information of one sample. margin: from a coefficient to its
+    bounds, in standard errors.
+    """
+    s = rms_of_columns(Z)
+    X = Z / s
+    P = np.linalg.inv(X.T @ X + EIGENVALUE_FLOOR * len(X) * np.eye(X.shape[1]))
+    b = P @ (X.T @ y)
+    e2 = (y - X @ b) ** 2
+    d = margin * np.sqrt(np.maximum(np.diag(P), 0.0) * e2.mean() / share)
+    return (b - d) / s, (b + d) / s, noise_scale(e2)
 
 
 def _newey_west(X: Floats, e: Floats, P: Floats, stretch: Ints, lag: int) -> Floats:

@@ -166,26 +166,11 @@ class Innovations:
 
     def gain_bounds(self, share: float) -> tuple[Floats, Floats, float]:
         """Lower and upper bound on the gain of each response, (G,) each, where the model has the gain 1, and
-        the scale of the noise, in variances of it; by least squares of v on Z (`regression`):
-
-            N = Z / d,   P = (N' N + eps 3 n I)^-1,   b = P N' v,   r = v - N b
-            bounds = (b -+ BOUND_MARGIN sqrt(diag(P) mean(r^2) / share)) / d
-
-        d: root mean squares of the columns of Z (3 + G,); b: coefficients of N (3 + G,); r: residual (3 n,).
-        eps: EIGENVALUE_FLOOR; it keeps the bounds finite, and far apart, where the columns depend on one
-        another. share: number of white samples that have the information of one sample.
+        the scale of the noise, in variances of it; by `coefficient_bounds` of the regression of v on Z.
+        share: number of white samples that have the information of one sample.
         """
-        Z, v = self.regression()
-        d = least_squares.rms_of_columns(Z)
-        N = Z / d
-        ridge = least_squares.EIGENVALUE_FLOOR * len(N) * np.eye(N.shape[1])
-        P = np.linalg.inv(N.T @ N + ridge)
-        b = P @ (N.T @ v)
-        r2 = (v - N @ b) ** 2
-        margin = BOUND_MARGIN * np.sqrt(np.maximum(np.diag(P), 0.0) * r2.mean() / share)
-        low = (b - margin) / d
-        high = (b + margin) / d
-        return low[3:], high[3:], least_squares.noise_scale(r2)  # the first 3 are the trim
+        low, high, scale = least_squares.coefficient_bounds(*self.regression(), share, BOUND_MARGIN)
+        return low[3:], high[3:], scale  # the first 3 are the trim
 
     def gains(self) -> Floats:
         """The gain of each response, (G,), by least squares of v on Z (`regression`)."""

@@ -124,7 +124,7 @@ def fault_evidence(p: Floats, bank: HypothesisBank) -> Floats:
     return np.log(fault / (1.0 - fault)) - np.log(prior / (1.0 - prior))
 
 
-@kernel
+@kernel(allocates=True)
 def page_cusum(z, top):
     """Page's sum of the evidence z (n,), between 0 and top:
 
@@ -199,7 +199,7 @@ def recent_scale(g: Floats, ok: np.ndarray, rate_hz: float) -> Floats:
     return ratio
 
 
-@kernel
+@kernel(allocates=True)
 def run_bank(y, F, ok, bank, states, noise, r_min, q):
     """Posterior probabilities (n, H), and the log likelihood of each sample given all before it, but for a
     constant, (n,): log sum_h prior_h exp(ll_h), as in `_correct`; 0 for a sample that is not used.
@@ -240,7 +240,7 @@ def run_bank(y, F, ok, bank, states, noise, r_min, q):
     return post, ll
 
 
-@kernel
+@kernel(allocates=True)
 def _mix(p, x, P, bank, walk):
     """Interaction of the hypotheses: each may change to any other. x (H, N) and P (H, N, N) are replaced.
     Returns the prior probabilities (H,):
@@ -263,7 +263,7 @@ def _mix(p, x, P, bank, walk):
     return prior / prior.sum()
 
 
-@kernel
+@kernel(allocates=True)
 def _merge(w, x, P, m, M, offset, walk):
     """Replace two Gaussians by one with the same moments: (x, P) of the hypothesis, with weight w, and (m, M)
     of the mixture of all hypotheses, with weight v = 1 - w:
@@ -283,7 +283,7 @@ def _merge(w, x, P, m, M, offset, walk):
         P[i, i] += v * offset[i]
 
 
-@kernel
+@kernel(allocates=True)
 def _relax(x, P, states):
     """Move all trims and gains towards those m of the model, by one sample, with the retention rho (N,):
 
@@ -295,7 +295,7 @@ def _relax(x, P, states):
     P *= np.outer(rho, rho)
 
 
-@kernel
+@kernel(allocates=True)
 def _correct(prior, x, P, y, F, bank, noise, scale):
     """Kalman correction of every hypothesis by one sample y (3,), F (G, 3); x and P are replaced. The last
     hypothesis has no states: nothing answers.
@@ -326,7 +326,7 @@ def _correct(prior, x, P, y, F, bank, noise, scale):
     return p, mean, top + np.log(total)
 
 
-@kernel
+@kernel(allocates=True)
 def _sensitivities(a, kappa, F, c, N):
     """Effect of the states on the unexplained rates, C (N, 3):
 
@@ -345,7 +345,7 @@ def _sensitivities(a, kappa, F, c, N):
     return C
 
 
-@kernel
+@kernel(allocates=True)
 def _update(x, P, y, C, V, noise):
     """Correct one Gaussian, x (N,) and P (N, N), by y (3,) = C' x + noise of covariance V; both are replaced:
 
@@ -368,7 +368,7 @@ def _update(x, P, y, C, V, noise):
     return d2, np.log(det)
 
 
-@kernel
+@kernel(allocates=True)
 def _invert(S):
     """Inverse and determinant of a symmetric matrix S (3, 3), by its cofactors A:
 

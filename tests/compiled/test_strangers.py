@@ -81,7 +81,7 @@ json.dump({
 '''
 
 OURS = """
-from beaver_ftc.compiled import kernel, apart, direct, record, row_of, sized
+from beaver_ftc.compiled import kernel, apart, direct, record, sized
 
 @sized
 def of(n):
@@ -89,11 +89,11 @@ def of(n):
 
 @kernel
 def halve(x):
-    x[:] = 0.5 * x
+    x *= 0.5
 
 @kernel
 def advance(records, log):
-    halve(row_of(log, 0))
+    halve(log[0])
     records[0].state[:] = 1.0
     return records[0].state.sum() + log[0, 1]
 

@@ -31,13 +31,13 @@ compiled.cache_folder = lambda: Path(__file__).parent / "cache"
 
 @compiled.apart
 def halve(record):
-    record.value[:] = 0.5 * record.value
+    record.value *= 0.5
 
 @compiled.kernel
 def step(records, log):
     halve(records[0])
-    row = compiled.row_of(log, 1)
-    row[:] = records[0].value / 0.0
+    for i in range(2):
+        log[1, i] = records[0].value[i] / 0.0
     return records[0].value.sum() / records.size
 
 if __name__ == "__main__":
@@ -107,7 +107,7 @@ def test_code_for_size_is_shorter_gives_the_same_and_is_kept_apart(tmp_path):
             x[i] += weights[i] * x[i]
         return x[0]
 
-    quick, short = (compiled.compile_into(tmp_path, add_up, for_size) for for_size in (False, True))
+    quick, short = (compiled.compile_into(tmp_path, add_up, for_size=for_size) for for_size in (False, True))
     given = np.arange(1.0, 10.0), np.linspace(0.5, 1.0, 9)
     x = given[0].copy()
     assert short(x, given[1]) == add_up(given[0], given[1])

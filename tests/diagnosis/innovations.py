@@ -9,7 +9,7 @@ import numpy as np
 from scipy.linalg import block_diag
 from scipy.signal import lfilter
 
-from beaver_ftc.compiled import kernel
+from beaver_ftc.compiled import copy, kernel
 from beaver_ftc.diagnosis.detection import likelihood, whitening
 from beaver_ftc.diagnosis.detection.likelihood import (
     N_GROUP_TESTS,
@@ -103,7 +103,7 @@ def filter_all(block, innovations, dt, out):
     """Innovations (k, n) rad/s2 whitened into out (k, 2)."""
     for k in range(len(innovations)):
         whitening.advance_covariance(block, dt)
-        block.nu[: block.n] = innovations[k]
+        copy(innovations[k], block.nu[: block.n])
         whitening.whiten_step(block, block.state, block.nu, dt, out[k])
 
 
@@ -124,10 +124,10 @@ def bounded_all(block, d, signatures, onset, dt):
     block.eta[:] = 0.02
     for k in range(len(d)):
         whitening.advance_covariance(block, dt)
-        block.nu[: block.n] = d[k]
+        copy(d[k], block.nu[: block.n])
         whitening.whiten_step(block, block.state, block.nu, dt, block.g)
         for h in range(block.n_h):
-            block.hypothesis[h].signature[: block.n] = signatures[k, h]
+            copy(signatures[k, h], block.hypothesis[h].signature[: block.n])
         likelihood.bound_responses(block, dt)
         if k >= onset:
             likelihood.accumulate_evidence(block, dt, 1.0)

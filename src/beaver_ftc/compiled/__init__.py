@@ -27,7 +27,6 @@ from typing import Any
 
 import numba
 import numpy as np
-from numba.extending import overload
 
 from beaver_ftc.compiled.cache import BY_ADDRESS
 from beaver_ftc.compiled.records import fill, record, sized
@@ -37,7 +36,7 @@ from beaver_ftc.documents.files import cache_of_version, digest_of_files
 # mypy: disable-error-code="attr-defined,method-assign,assignment"
 
 
-__all__ = ["apart", "copy", "direct", "fill", "kernel", "plain", "record", "row_of", "sized"]
+__all__ = ["apart", "copy", "direct", "fill", "kernel", "plain", "record", "sized"]
 
 KNOWN = ("0.68",)  # versions of Numba whose inside is as we have found it
 VARIABLE = "BEAVER_FTC_COMPILER"  # `numba`: as with a version that is not known
@@ -55,14 +54,14 @@ def cache_folder() -> Path | None:
     return cache_of_version(digest_of_files(*sorted(_FOLDER.glob("*.py"))))
 
 
-def kernel(function, for_size=False):
+def kernel(function=None, **options):
     """Compile a function of arrays, records and numbers; the plain form stays at `.py_func`.
 
-    for_size: whether its code is optimised for size. Between two frames JSBSim displaces code and data from
-    the processor's fast caches, so that short code whose loops are a few numbers long runs sooner. Long loops
-    take a quarter longer.
+    options: see `compile_into`.
     """
-    return compile_into(cache_folder(), function, for_size)
+    if function is None:
+        return functools.partial(kernel, **options)
+    return compile_into(cache_folder(), function, **options)
 
 
 def apart(function=None, *, long_loops=False):
@@ -95,15 +94,21 @@ def plain(function):
     return getattr(function, "py_func", function)
 
 
-def compile_into(folder: Path | None, function, for_size=False):
-    """Compile a function when it is first called, and keep its code in `folder`; for_size: see `kernel`.
+def compile_into(folder: Path | None, function, *, for_size=False, allocates=False):
+    """Compile a function when it is first called, and keep its code in `folder`.
+
+    for_size: whether its code is optimised for size. Between two frames JSBSim displaces code and data from
+    the processor's fast caches, so that short code whose loops are a few numbers long runs sooner. Long loops
+    take a quarter longer. allocates: whether it makes or returns arrays. Only then are their users counted.
 
     With NUMBA_DISABLE_JIT=1 nothing is compiled: the same function, slow, for a debugger.
     """
     if numba.config.DISABLE_JIT:
         return _interpreted(function)
     target = _own_target()
-    return target.Kernel(folder, function, for_size) if target else numba.njit(error_model="numpy")(function)
+    if target is None:
+        return numba.njit(error_model="numpy")(function)
+    return target.Kernel(folder, function, for_size, allocates)
 
 
 @functools.cache
@@ -147,28 +152,6 @@ def _entry_point(function, kinds):
     types = tuple(numba.types.Array(numba.from_dtype(dtype), dimensions, "C") for dtype, dimensions in kinds)
     function.compile(types)
     return function.overloads[types].entry_point
-
-
-def row_of(array, i):
-    """Row i of an array (m, n) that stays where it is for as long as the row is used.
-
-    Compiled code counts who refers to a row, function by function, with instructions that wait until all
-    that was written before has arrived: a tenth of a frame. Where Numba's inside is known, this row is not
-    counted.
-    """
-    return array[i]
-
-
-@overload(row_of)
-def _row_of(array, i):
-    if not borrows():
-        return lambda array, i: array[i]
-    from beaver_ftc.compiled.sized_types import borrowed_row
-
-    def row(array, i):
-        return borrowed_row(array, i)  # type: ignore[call-arg]
-
-    return row
 
 
 def _interpreted(function):

@@ -368,20 +368,19 @@ def _unbox_record(kind: Any, given: Any, c: Any) -> NativeValue:
 
 @unbox(SizedRecords)
 def _unbox_records(kind: Any, given: Any, c: Any) -> NativeValue:
-    """A row of records from Python, kept alive for as long as the call lasts."""
+    """A row of records from Python, whose caller keeps it for as long as the call lasts."""
     records = _struct(c.context, c.builder, kind)
     builder = c.builder
     bytes_of = types.Array(types.uint8, 1, "A")
     array = make_array(bytes_of)(c.context, builder)
     there = builder.bitcast(array._getpointer(), c.pyapi.voidptr)
-    code = c.pyapi.nrt_adapt_ndarray_from_python(given, there)
+    code = c.pyapi.numba_array_adaptor(given, there)
     records.memory = array.data
     (count,), (apart,) = (cgutils.unpack_tuple(builder, of, 1) for of in (array.shape, array.strides))
     records.count, records.apart = count, apart
     records.places, failed = _ask(c, kind, given)
     return NativeValue(
         records._getvalue(),
-        cleanup=lambda: c.context.nrt.decref(builder, bytes_of, array._getvalue()),
         is_error=builder.or_(cgutils.is_not_null(builder, code), failed),
     )
 
@@ -389,17 +388,3 @@ def _unbox_records(kind: Any, given: Any, c: Any) -> NativeValue:
 def array_type(dtype: Any, dimensions: int) -> Any:
     """The type of a C-ordered array; of records that have a size, theirs."""
     return kind_of(dtype, dimensions) or types.Array(numba.from_dtype(dtype), dimensions, "C")
-
-
-@intrinsic
-def borrowed_row(typingctx, array, i):
-    """Row i of an array (m, n) that nobody counts the users of: it must stay where it is meanwhile."""
-    row_type = types.Array(array.dtype, 1, "C")
-
-    def codegen(context, builder, signature, args):
-        whole = make_array(signature.args[0])(context, builder, args[0])
-        _, columns = cgutils.unpack_tuple(builder, whole.shape, 2)
-        first = builder.gep(whole.data, [builder.mul(args[1], columns)])
-        return _array(context, builder, row_type, first, [columns])
-
-    return row_type(array, types.intp), codegen

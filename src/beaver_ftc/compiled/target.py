@@ -5,7 +5,9 @@ its functions, and the contexts in which they are typed and translated. Ours inh
 CPU target. Nothing of Numba is replaced: a function that somebody else compiles never comes here.
 
 Machine code. Numba optimises a function again at each level of calls. Here a kernel that another one calls
-is only translated; the outermost one is optimised once, with all that it calls (`Library`).
+is only translated; the outermost one is optimised once, with all that it calls (`Library`). Kernels allocate
+nothing, so nobody counts the users of an array; of the steps to machine code, those are taken that change
+something in a kernel (`_Pipeline`).
 
 Kernels that only some flights call are called by their address, each compiled by itself when a flight first
 calls it. The caller holds the address, zero at first; then Python finds or compiles the code. So a flight
@@ -25,9 +27,11 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from numba.core import cgutils, serialize, sigutils, types, typing
+from numba.core import cgutils, serialize, sigutils, typed_passes, types, typing, untyped_passes
 from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
+from numba.core.compiler import Compiler, CompilerBase
 from numba.core.compiler_lock import global_compiler_lock
+from numba.core.compiler_machinery import PassManager
 from numba.core.cpu import CPUContext
 from numba.core.datamodel import models
 from numba.core.registry import CPUDispatcher, CPUTarget, cpu_target
@@ -67,6 +71,10 @@ class Library(JITCodeLibrary):
 
     only_translated = False
 
+    def _optimize_functions(self, ll_module: Any) -> None:
+        """Leave each function as it is until all are linked; Numba optimises each by itself before."""
+        ll_module.data_layout = self._codegen._data_layout
+
     def finalize(self) -> None:
         """Optimise the code with all that it calls, unless it is a part of another."""
         self._raise_if_finalized()
@@ -84,7 +92,8 @@ class Library(JITCodeLibrary):
         if compiling and compiling[0].for_size:
             for function in _defined(self._final_module):
                 function.add_function_attribute("optsize")
-        self._optimize_final_module()
+        passes, builder = self._codegen._module_pass_manager()
+        passes.run(self._final_module, builder)
         self._final_module.verify()
         with cache.held():
             self._finalize_final_module()
@@ -197,6 +206,19 @@ def _asked(context: Any, builder: Any, ask: Callable[[], int]) -> Any:
 
 
 NAME = "beaver_ftc"  # of the target
+STEPS = (
+    untyped_passes.TranslateByteCode,
+    untyped_passes.FixupArgs,
+    untyped_passes.IRProcessing,
+    untyped_passes.GenericRewrites,
+    untyped_passes.ReconstructSSA,
+    typed_passes.NopythonTypeInference,
+    typed_passes.PreLowerStripPhis,
+    typed_passes.IRLegalization,
+    typed_passes.AnnotateTypes,
+    typed_passes.NativeLowering,
+    typed_passes.NoPythonBackend,
+)
 
 
 class Target(CPU):
@@ -306,14 +328,31 @@ class Dispatcher(CPUDispatcher):
             super().add_overload(cres)
 
 
+class _Pipeline(CompilerBase):
+    """Numba's steps from byte code to machine code, without those for closures, objects, literals, array
+    expressions and parallel loops."""
+
+    def define_pipelines(self) -> list[PassManager]:
+        """One list of steps, without another to fall back to."""
+        steps = PassManager(NAME)
+        for step in STEPS:
+            steps.add_pass(step, step.__name__)
+        steps.finalize()
+        return [steps]
+
+
 class Kernel(Dispatcher):
     """A kernel: kept by itself if Python calls it, and a part of the kernels that call it.
 
-    for_size: whether its code, with all that is a part of it, is optimised for size.
+    for_size: whether its code, with all that is a part of it, is optimised for size. allocates: whether it
+    makes or returns arrays; it then takes all of Numba's steps.
     """
 
-    def __init__(self, folder: Path | None, function: Callable[..., Any], for_size: bool = False) -> None:
-        super().__init__(function, targetoptions={"nopython": True, "error_model": "numpy"})
+    def __init__(
+        self, folder: Path | None, function: Callable[..., Any], for_size: bool, allocates: bool
+    ) -> None:
+        options = {"nopython": True, "error_model": "numpy", "_nrt": allocates}
+        super().__init__(function, {}, options, pipeline_class=Compiler if allocates else _Pipeline)
         self.folder, self._cached = folder, CodeCache(folder, function, for_size) if folder else None
         self.for_size = for_size
         self._inner: set[tuple[Any, ...]] = set()  # arguments for which it is only a part of others so far

@@ -30,7 +30,7 @@ import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.aircraft.aircraft import GRAVITY_MPS2
-from beaver_ftc.compiled import fill, kernel, record, row_of
+from beaver_ftc.compiled import fill, kernel, record
 from beaver_ftc.control.allocation import within_stops
 from beaver_ftc.control.profile import SPEED, clamp
 from beaver_ftc.control.thrust import between
@@ -147,11 +147,11 @@ def dynamic_pressure_limit(holding, flap, elevator, limit):
         from a later point on                    between two points         the same
         nowhere                                  infinite                   the last point
     """
-    before = between(flap, N_FLAP, holding.flap, row_of(holding.elevator, 0))
+    before = between(flap, N_FLAP, holding.flap, holding.elevator[0])
     if before > elevator:
         return holding.qdyn[0] if limit == FASTEST else 0.0
     for j in range(1, N_QDYN):
-        after = between(flap, N_FLAP, holding.flap, row_of(holding.elevator, j))
+        after = between(flap, N_FLAP, holding.flap, holding.elevator[j])
         if after > elevator:
             part = (elevator - before) / (after - before)
             return holding.qdyn[j - 1] + part * (holding.qdyn[j] - holding.qdyn[j - 1])

@@ -6,7 +6,7 @@ are those of `Notes`.
 
 import numpy as np
 
-from beaver_ftc.compiled import direct, kernel, row_of
+from beaver_ftc.compiled import direct, kernel
 from beaver_ftc.diagnosis import Measured
 from beaver_ftc.loop import frame as whole
 from beaver_ftc.loop.assembly import y_places
@@ -23,7 +23,7 @@ def fly_and_note(frames, references, log, notes):
     notes (frames, columns): row frame.k is filled. The rest, and what is returned: see `stepping.fly_frame`.
     """
     frame = frames[0]
-    row = row_of(notes, frame.k)
+    row = notes[frame.k]
     whole.begin(frame)
     if frame.departed == NOT_FINITE:
         return frame.departed
@@ -41,7 +41,7 @@ def fly_and_note(frames, references, log, notes):
     diagnose_one(frame)
     whole.decide(frame)
     whole.command(frame)
-    whole.finish(frame, row_of(references, frame.row), row_of(log, frame.row))
+    whole.finish(frame, references[frame.row], log[frame.row])
     error_map = frame.fdi.bound.error_map
     at = put(row, at, error_map.e_now)
     row[at] = not error_map.outside

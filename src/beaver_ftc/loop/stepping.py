@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numba import types
 
-from beaver_ftc.compiled import apart, borrows, kernel, row_of
+from beaver_ftc.compiled import apart, borrows, kernel
 from beaver_ftc.compiled.cache import Wanted
 from beaver_ftc.control import CompiledLaw, accommodation, allocation, laws
 from beaver_ftc.control.state import in_charge
@@ -70,7 +70,7 @@ def take_command(frames, deflections):
 def finish(frames, references, log):
     """The end of a frame; references, log: as in `fly_frame`."""
     frame = frames[0]
-    whole.finish(frame, row_of(references, frame.row), row_of(log, frame.row))
+    whole.finish(frame, references[frame.row], log[frame.row])
 
 
 @kernel
@@ -117,7 +117,7 @@ def fly_frame(frames, references, log):
     or why the flight ends: the row of a departure is still recorded, that of a non-finite truth is not.
     """
     frame = frames[0]
-    fly_one(frame, row_of(references, frame.row), row_of(log, frame.row))
+    fly_one(frame, references[frame.row], log[frame.row])
     return frame.departed
 
 

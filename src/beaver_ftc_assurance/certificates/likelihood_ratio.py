@@ -179,7 +179,15 @@ class LikelihoodRatio:
         Q_x = series.jitter / (self.dt * self.dt)
         of_frames = inputs, series.drift, Q_x, series.bounded, series.foreseen, series.keep, series.pace
         arrays = map(np.ascontiguousarray, of_frames)
-        N_f, room = add_whitened_frames(new_filter_block(self.P, self.R), *arrays, states, sums, self.dt)
+        N_f, room = add_whitened_frames(
+            new_filter_block(self.P, self.R),
+            *arrays,
+            states,
+            np.zeros((len(states), 2)),
+            np.zeros(2),
+            sums,
+            self.dt,
+        )
         return sums, N_f, room
 
     @property
@@ -199,10 +207,10 @@ def _null_for_zero(values: np.ndarray) -> list[float | None]:
 
 
 @kernel
-def add_whitened_frames(blocks, inputs, drift, jitter, bounded, foreseen, keep, pace, states, sums, dt):
+def add_whitened_frames(blocks, inputs, drift, jitter, bounded, foreseen, keep, pace, states, g, w, sums, dt):
     """Run a filter, blocks (1,), over the frames of a `LikelihoodRatio`, and add w.g of each frame to `sums`
-    (columns,): g (2,), the whitened input of each column; w = S^-1 g of column 1, the signature. See
-    `likelihood.accumulate_tests`.
+    (columns,): g (columns, 2), the whitened inputs; w (2,) = S^-1 g of column 1, the signature, zero at
+    first. See `likelihood.accumulate_tests`.
 
     inputs (frames, columns, n); drift (frames, n, n); jitter, bounded, foreseen (frames, n): of n axes; keep,
     pace (frames,). states (columns, 4): advanced in place. Returns N_f, the sum of w.foreseen, and the room
@@ -213,8 +221,6 @@ def add_whitened_frames(blocks, inputs, drift, jitter, bounded, foreseen, keep, 
     and last: eta_r |w| of the last frame.
     """
     block = blocks[0]
-    g = np.zeros((len(states), 2))
-    w = np.zeros(2)
     e_0 = e_tv = e_w = last = N_f = 0.0
     for k in range(len(inputs)):
         block.a = keep[k]

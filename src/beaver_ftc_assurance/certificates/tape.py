@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from beaver_ftc.compiled import direct, kernel
+from beaver_ftc.compiled import copy, direct, kernel
 from beaver_ftc.diagnosis import estimator_names
 from beaver_ftc.diagnosis.detection import N_SLOTS
 from beaver_ftc.loop import (
@@ -196,7 +196,7 @@ def keep_frame(record, always, early, kept, ring, alarm, state):
             state[CLEAR] = k
     elif state[ALARM] < 0:
         state[ALARM] = k
-        alarm[:] = record
+        copy(record, alarm)
     after = k - state[ALARM] if state[ALARM] >= 0 else 0
     row = k % rows if after == 0 else rows - 1 + after
     if row >= len(kept):

@@ -5,7 +5,7 @@ import pytest
 from innovations import drawn
 
 from beaver_ftc.aircraft import AXES, load
-from beaver_ftc.compiled import kernel
+from beaver_ftc.compiled import copy, kernel
 from beaver_ftc.diagnosis.detection import likelihood, statistical, statistical_design
 from beaver_ftc.diagnosis.detection.likelihood import N_SLOTS
 from beaver_ftc.diagnosis.detection.rows import RATES
@@ -74,7 +74,8 @@ def watch_all(detector, innovations, Gu, cubic, first, renew, dt, scores):
         blocks, alarm, rows = detector.block, detector.alarm, detector.rows
         rows.per_cubed = cubic[k]
         for i in range(3):
-            rows.nu[RATES, i], rows.Gu[:4, i] = innovations[k, i], Gu[k, i]
+            rows.nu[RATES, i] = innovations[k, i]
+            copy(Gu[k, i], rows.Gu[:4, i])
         statistical.update_blocks(detector, dt, first + k, 0)
         views = detector.views[: detector.n_views]
         statistical.update_alarm(detector, views, (first + k) * dt)

@@ -29,7 +29,7 @@ from math import exp, sqrt
 import numpy as np
 
 from beaver_ftc.aircraft import AXES
-from beaver_ftc.compiled import apart, copy, fill, kernel, record, row_of, sized
+from beaver_ftc.compiled import apart, copy, fill, kernel, record, sized
 from beaver_ftc.control import CompiledLaw, accommodation, allocation, laws
 from beaver_ftc.control.accommodation import approach, begin_frame, give_up, start_of, take_offsets
 from beaver_ftc.control.laws.effectiveness_estimator import (
@@ -238,9 +238,9 @@ def schedule(config, memory, qdyn, transfer_share):
         (config.L_disturbance_at, memory.L_disturbance),
     ):
         for i in range(3):
-            gains[i] = between(qdyn, N_POINTS, config.qdyn, row_of(table, i))
+            gains[i] = between(qdyn, N_POINTS, config.qdyn, table[i])
         if transfer_share > 0.0:
-            by_stand_in = between(qdyn, N_POINTS, config.qdyn, row_of(table, STAND_IN))
+            by_stand_in = between(qdyn, N_POINTS, config.qdyn, table[STAND_IN])
             gains[PITCH] += transfer_share * (by_stand_in - gains[PITCH])
 
 

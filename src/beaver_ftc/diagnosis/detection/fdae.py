@@ -22,7 +22,7 @@ from math import exp
 
 import numpy as np
 
-from beaver_ftc.compiled import copy, fill, kernel, record, row_of
+from beaver_ftc.compiled import copy, fill, kernel, record
 from beaver_ftc.diagnosis.detection.directions import project
 from beaver_ftc.diagnosis.detection.filters import advance_bound
 from beaver_ftc.scenario.declared import Declared
@@ -113,7 +113,7 @@ def evaluate_network(net, alpha, beta):
     """fhat = W^T Phi, rad/s2, at the present alpha and beta."""
     fill_basis(alpha, beta, net.memory.Phi)
     for i in range(3):
-        net.output[i] = project(row_of(net.memory.weights, i), net.memory.Phi, False)
+        net.output[i] = project(net.memory.weights[i], net.memory.Phi, False)
 
 
 @kernel
@@ -133,7 +133,7 @@ def train_network(net, eps, mu, leaks, dt):
     a = np.exp(-net.config.leak * dt) if leaks else 1.0
     for i in range(3):
         step = dt * net.config.gain * beyond_bound(eps[i], mu[i])
-        train(row_of(net.memory.weights, i), net.memory.Phi, a, step, net.config.w_max)
+        train(net.memory.weights[i], net.memory.Phi, a, step, net.config.w_max)
 
 
 @kernel

@@ -37,7 +37,7 @@ from math import exp, log
 import numpy as np
 
 from beaver_ftc.aircraft import AXES
-from beaver_ftc.compiled import kernel, record, row_of
+from beaver_ftc.compiled import kernel, record
 from beaver_ftc.diagnosis.detection.directions import along
 from beaver_ftc.diagnosis.state import STATISTICAL_DETECTOR, WORST_CASE_DETECTOR
 from beaver_ftc.scenario.declared import Declared, SensorErrors
@@ -254,8 +254,8 @@ def is_reachable(bank, fie, shared):
     """
     for m in range(bank.config.n_filters):
         for i in range(4):
-            E = along(row_of(bank.output.residual, m), fie.parity_direction, i, False)
-            T = along(row_of(bank.output.threshold, m), fie.parity_direction, i, True)
+            E = along(bank.output.residual[m], fie.parity_direction, i, False)
+            T = along(bank.output.threshold[m], fie.parity_direction, i, True)
             counts = not fie.skip[i] if i < 3 else shared
             if counts and not fie.reach_lo[m, i] - T <= E <= fie.reach_hi[m, i] + T:
                 return False

@@ -69,7 +69,7 @@ from typing import NamedTuple
 import numpy as np
 
 from beaver_ftc.aircraft.schema import MAX_SURFACES
-from beaver_ftc.compiled import kernel, record, row_of, sized
+from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.diagnosis.detection import likelihood
 from beaver_ftc.diagnosis.detection.directions import project
 from beaver_ftc.diagnosis.detection.forces import MIN_UPDATES
@@ -182,7 +182,7 @@ def fill_view_drift(view, q, gust, source_gust, forces, V):
     """
     b = view.block
     L = gust.output.rate_damping
-    m = row_of(b.m, 0)
+    m = b.m[0]
     Q_d = q * max(b.eta[0], likelihood.MIN_ETA_RAD_S2) ** 2
     for i, f in enumerate(forces.component):
         Q_d += (b.source == INERTIAL) * (m[SIDE_FORCE + i] * forces.q_ratio) ** 2 * f.Q_e
@@ -254,7 +254,7 @@ def changes_view(view, forces, s, G):
     For the surface s that the view nulls this is false by definition: the view was turned across its column
     of the frame before, so m' G of this frame is not exactly 0.
     """
-    m = row_of(view.block.m, 0)
+    m = view.block.m[0]
     effect = project(G, m, False)
     for i, f in enumerate(forces.component):
         effect += m[SIDE_FORCE + i] * f.G[s]

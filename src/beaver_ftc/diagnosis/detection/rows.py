@@ -45,7 +45,7 @@ import numpy as np
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.aircraft.aircraft import FORCES
 from beaver_ftc.aircraft.schema import MAX_MONOMIALS, MAX_SURFACES, MAX_TERMS
-from beaver_ftc.compiled import kernel, record, row_of
+from beaver_ftc.compiled import kernel, record
 from beaver_ftc.design.engine import slipstream_slopes
 from beaver_ftc.design.model import accelerate
 from beaver_ftc.design.table import (
@@ -381,7 +381,7 @@ def set_columns(b: np.void, rows: np.void, columns: list[int]) -> None:
 @kernel
 def projection(m, i, X, k, size=False):
     """m_i X_k, row k of X (K, 5) in direction i of m (2, 5); |m_i| X_k if the rows of X are a `size`."""
-    return project(row_of(m, i), row_of(X, k), size)
+    return project(m[i], X[k], size)
 
 
 @kernel
@@ -414,4 +414,4 @@ def project_rows(b, rows):
 def fill_leak(b, rows, leak, col):
     """Fill the last regressor of a view, leak col' nu, rad/s2: the share `leak` of nu along the column col
     (5,), which errors of that column let through (parity.py)."""
-    b.regressor[b.n_Z - 1, 0] = leak * project(col, row_of(rows.nu, b.source), False)
+    b.regressor[b.n_Z - 1, 0] = leak * project(col, rows.nu[b.source], False)

@@ -9,7 +9,7 @@ input, together of unit length.
 
 import numpy as np
 
-from beaver_ftc.compiled import kernel, record, row_of
+from beaver_ftc.compiled import kernel, record
 from beaver_ftc.design.table import ALPHA, BETA
 from beaver_ftc.diagnosis.detection.fdae import fill_gaussians, train
 from beaver_ftc.diagnosis.state import PITCH
@@ -51,7 +51,7 @@ def fill_input_basis(net, i, j, v):
     If v is outside the centres, they are those at the nearest edge. Elements from N_CENTRES[j] on are unused.
     """
     n = N_CENTRES[j]
-    part = row_of(net.memory.part, j)
+    part = net.memory.part[j]
     norm = np.sqrt(fill_gaussians(v, net.config.c0[i, j], net.config.dc[i, j], n, 0, part))
     for k in range(n):
         part[k] /= norm
@@ -84,4 +84,4 @@ def train_state_network(net, eps, dt):
     """th <- clip(th + dt Gamma Z eps, w_max), Z: the basis as it was evaluated; eps (3,) rad/s."""
     for i in range(3):
         step = dt * net.config.gain * eps[i]
-        train(row_of(net.memory.weights, i), row_of(net.memory.basis, i), 1.0, step, net.config.w_max)
+        train(net.memory.weights[i], net.memory.basis[i], 1.0, step, net.config.w_max)

@@ -461,7 +461,7 @@ def update_bounds(mon, y):
         for j in range(RPM_TEST):
             leak(initial.H_m[h, j], mon.decay, initial.H[h, j])
     if too_steep(mon, y):
-        initial.E[H_PHI:] = initial.E_start[H_PHI:]
+        copy(initial.E_start[H_PHI:], initial.E[H_PHI:])
         initial.C_m[:ALPHA_IN_BETA] = 0.0
         initial.H_m[H_PHI:, ANGLE_TEST:SPEED_TEST] = 1.0
     tighten_bounds(mon)

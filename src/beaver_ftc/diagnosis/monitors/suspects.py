@@ -83,10 +83,12 @@ def latch_exceeded(mon):
     """
     exceeded = mon.exceeded
     for j in range(N_TESTS):
-        coupled = -1.0
-        if j < SPEED_TEST:  # j - j % 3: the first of the three axes, or angles
-            coupled = COUPLING_SHARE * np.abs(mon.r[j - j % 3 : j - j % 3 + 3, 0]).max()
-        exceeded[j] |= mon.ratio[j] > 1.0 and abs(mon.r[j, 0]) > coupled
+        exceeds = mon.ratio[j] > 1.0
+        if j < SPEED_TEST:
+            first = j - j % 3  # of the three axes, or angles
+            for i in range(first, first + 3):
+                exceeds &= abs(mon.r[j, 0]) > COUPLING_SHARE * abs(mon.r[i, 0])
+        exceeded[j] |= exceeds
     latch_refuted(mon, exceeded)
 
 

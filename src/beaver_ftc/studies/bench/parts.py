@@ -99,13 +99,13 @@ def frame_without(stand_ins: Mapping[str, Kernel], name: str) -> Kernel:
     used: set[str] = set()
     folder = compiled.cache_folder()
 
-    def kernel(function, for_size=False):
+    def kernel(function, **options):
         """The decorator in place of `compiled.kernel`: compile a function, or its stand-in, into the own
         cache."""
         full_name = f"{function.__module__}.{function.__name__}".removeprefix("beaver_ftc.")
         used.add(full_name)
         made_of = stand_ins.get(full_name, function)
-        return compiled.compile_into(folder / name if folder else None, made_of, for_size)
+        return compiled.compile_into(folder / name if folder else None, made_of, **options)
 
     with _fresh_kernel_modules(kernel):
         fly_on = import_module("beaver_ftc.loop.stepping").fly_on

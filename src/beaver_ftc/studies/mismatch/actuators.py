@@ -41,7 +41,7 @@ def _servo(scenario: Scenario, surface: str, dt: float) -> tuple[float, ...]:
     return share, reach, radians(errors.dead_band_deg), *stops
 
 
-@kernel
+@kernel(allocates=True)
 def _follow(commands, share, reach, band, low, high, runs, positions):
     """Fill positions (n, 4) rad with a, by the recursion of the module. runs: JSBSim frames in a row.
 

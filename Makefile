@@ -29,7 +29,7 @@ help:
 	@echo "make demo       set up, fly the published elevator case, print the verdict and where the report lies"
 	@echo "make check      the tests that execute the lines you changed: a minute at most"
 	@echo "make test       set up and run every test of every day"
-	@echo "make nightly    all tests with all that they draw, browsers, notebooks, drawn scenarios, mutants"
+	@echo "make nightly    all tests with all that they draw, browsers, notebooks, pages, costs, drawn scenarios, mutants"
 	@echo "make core-test  the core's tests, in a copy without the products"
 	@echo "make promises   what is promised, and which tests hold each promise"
 	@echo "make acceptance the installed command from outside: every scenario, page and mistake; the longest tests"
@@ -81,11 +81,13 @@ test: $(VENV)/.test
 	  NUMBA_DISABLE_JIT=1 $(PYTEST) -n 0 -m "not nightly and not acceptance" $(PLAIN) && wait $$installing && wait
 	$(PYTEST) -m "not nightly and not acceptance" $(addprefix --ignore=,tests/acceptance $(PLAIN))
 
-# Every test with all that it draws, what tests/nightly.yaml lists too; then drawn scenarios, mutants.
+# Every test with all that it draws, what tests/nightly.yaml lists too; then pages, costs, drawn scenarios, mutants.
 nightly: $(VENV)/.dev
 	BEAVER_FTC_NIGHT=1 NUMBA_DISABLE_JIT=1 $(PYTEST) $(PLAIN)
 	BEAVER_FTC_NIGHT=1 $(PYTEST) -m "not acceptance" $(addprefix --ignore=,tests/acceptance $(PLAIN))
 	BEAVER_FTC_NIGHT=1 $(MAKE) acceptance
+	$(MAKE) docs-check
+	$(MAKE) cost
 	$(MAKE) core-test
 	$(BIN)/python -m tools.arithmetics
 	$(BIN)/python -m tools.drawn

@@ -20,7 +20,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from filelock import FileLock
-from tools.served import POSSIBLE, Served
+from tools.served import ONE_CORE, POSSIBLE, Served
+
+from samples import AT_NIGHT
 
 ROOT = Path(__file__).resolve().parents[2]
 KEPT = 3  # environments of earlier wheels
@@ -47,7 +49,10 @@ class Installation:
         return self.bin / "python"
 
     def environment(self, **more: str) -> dict[str, str]:
-        """The environment variables of a user who has activated it; nothing of the checkout is on a path."""
+        """The environment variables of a user who has activated it; nothing of the checkout is on a path.
+
+        By day a command that is forked starts no workers, which would import the package again.
+        """
         inherited = {name: value for name, value in os.environ.items() if not _is_ours(name)}
         places = filter(None, (self.before, self.bin, os.environ.get("PATH", os.defpath)))
         return {
@@ -55,6 +60,7 @@ class Installation:
             "PATH": os.pathsep.join(map(str, places)),
             "VIRTUAL_ENV": str(self.folder),
             "COLUMNS": "80",
+            **({} if AT_NIGHT else {ONE_CORE: "1"}),
             **more,
         }
 

@@ -21,10 +21,6 @@ TEXT_ONLY = re.compile(
     "bench|reproduce|sensitivity|compare --|detectability|--backend|--flightgear|--search|--out|"
     "--help|schema|--map|--variant [^ ]*,[^ ]*,|matrix --[dp]|ftc new|ftc show|challenge new|&&"
 )
-# These run by day for their text alone; the tests of each command ask smaller runs for JSON.
-IN_JSON_AT_NIGHT = re.compile(
-    r"matrix|sensitivity|jet\.yaml|scenarios/|challenge grade|sweep \S+ --(junit|resume)"
-)
 PLUGIN = next(line for line in TRIED if "--target plugins" in line)
 
 
@@ -42,9 +38,8 @@ def _without_report(line):
 
 
 def _has_json(line):
-    """Whether the line is run a second time for its answer in JSON."""
-    by_now = AT_NIGHT or not IN_JSON_AT_NIGHT.search(line)
-    return line.startswith("beaver-ftc") and not TEXT_ONLY.search(line) and by_now
+    """Whether the line is run a second time for its answer in JSON. By day its own tests ask it."""
+    return AT_NIGHT and line.startswith("beaver-ftc") and not TEXT_ONLY.search(line)
 
 
 def _succeeded(done):

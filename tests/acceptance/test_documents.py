@@ -38,7 +38,7 @@ def _without_report(line):
 
 
 def _has_json(line):
-    """Whether the line is run a second time for its answer in JSON. By day its own tests ask it."""
+    """Whether the line is run a second time for its answer in JSON. By day the command's tests ask."""
     return AT_NIGHT and line.startswith("beaver-ftc") and not TEXT_ONLY.search(line)
 
 

@@ -99,7 +99,8 @@ def compile_into(folder: Path | None, function, *, for_size=False, allocates=Fal
 
     for_size: whether its code is optimised for size. Between two frames JSBSim displaces code and data from
     the processor's fast caches, so that short code whose loops are a few numbers long runs sooner. Long loops
-    take a quarter longer. allocates: whether it makes or returns arrays. Only then are their users counted.
+    take a quarter longer. allocates: whether it makes or returns arrays, whose users only then are counted;
+    such a kernel takes no row of records that have a size.
 
     With NUMBA_DISABLE_JIT=1 nothing is compiled: the same function, slow, for a debugger.
     """

@@ -45,11 +45,7 @@ from numba.core.target_extension import (
 )
 from numba.core.types import unliteral
 from numba.core.utils import threadsafe_cached_property
-from numba.extending import (
-    intrinsic,
-    overload,
-    register_model,
-)
+from numba.extending import intrinsic, register_model
 
 from beaver_ftc.compiled import cache
 from beaver_ftc.compiled.cache import CodeCache, announced, locked
@@ -239,7 +235,6 @@ class _Context(CPUContext):
         if not self._registries:
             rtsys.initialize(cpu_target.target_context)  # what all targets share, as if ours were not there
             super().load_additional_registries()
-            _shorten_messages()
 
     def mangler(self, name: str, types: Any, *, abi_tags: Any = (), uid: Any = None) -> str:
         """The name of a compiled function: after what its types contain.
@@ -352,7 +347,8 @@ class Kernel(Dispatcher):
         self, folder: Path | None, function: Callable[..., Any], for_size: bool, allocates: bool
     ) -> None:
         options = {"nopython": True, "error_model": "numpy", "_nrt": allocates}
-        super().__init__(function, {}, options, pipeline_class=Compiler if allocates else _Pipeline)
+        pipeline = Compiler if allocates else _Pipeline
+        super().__init__(function, targetoptions=options, pipeline_class=pipeline)
         self.folder, self._cached = folder, CodeCache(folder, function, for_size) if folder else None
         self.for_size = for_size
         self._inner: set[tuple[Any, ...]] = set()  # arguments for which it is only a part of others so far
@@ -467,17 +463,3 @@ def _jit(**options: Any) -> Callable[..., Dispatcher]:
 
 dispatcher_registry[Target] = Kernel
 jit_registry[Target] = _jit
-
-
-@functools.cache
-def _shorten_messages() -> None:
-    """Numba puts two arrays' shapes into the message that one cannot be assigned to the other: to compile its
-    strings for that takes two seconds."""
-    from numba.np.arrayobj import raise_with_shape_context
-
-    @overload(raise_with_shape_context, target=NAME)
-    def _raise(src_shapes, index_shape):
-        def refuse(src_shapes, index_shape):
-            raise ValueError("an array cannot be assigned to one of another shape")
-
-        return refuse

@@ -138,10 +138,6 @@ def test_a_record_laid_out_otherwise_is_refused():
         direct(everything, filled(2, 2), found)(others, found)
 
 
-def begins(array):
-    return array.__array_interface__["data"][0]
-
-
 ASKED = """
 import json, sys, tempfile
 from pathlib import Path

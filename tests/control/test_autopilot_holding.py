@@ -77,6 +77,14 @@ def test_the_bank_limit_ends_with_the_loss():
     assert not autopilot["holding"]["in_force"][holding.BANK_LIMIT]
 
 
+def test_a_limit_in_force_from_the_start_began_there():
+    hold = table().view(np.recarray)[0].holding
+    hold["from_s"] = -1.0
+    for t, value in ((0.0, 40.0), (0.1, 41.0)):
+        holding.record_limit(hold, holding.FASTEST, value, True, t)
+    assert (hold["from_s"][holding.FASTEST], hold["value"][holding.FASTEST]) == (0.0, 41.0)
+
+
 class TestFlights:
     @pytest.mark.parametrize("position_deg", [-6.0, -7.4])
     def test_a_jam_nose_up_is_flown_at_a_speed_that_can_be_held(self, position_deg):

@@ -42,3 +42,11 @@ def test_the_way_out_of_nominal_leads_through_adaptive(told, now, wanted):
     supervise(supervisor, MODES.index(wanted), 0, 1.0)
     leaves_nominal = (told or now == "nominal") and wanted != "nominal"
     assert MODES[supervisor.mode] == ("adaptive" if leaves_nominal else wanted)
+
+
+def test_the_last_place_of_a_full_record_has_the_last_change():
+    supervisor = np.zeros(1, SUPERVISOR).view(np.recarray)[0]
+    supervisor.mode, n = 2, supervisor.mode_at_s.size
+    for t in range(n + 3):
+        supervise(supervisor, 2 + t % 2, 0, float(t))
+    assert supervisor.mode_at_s.tolist() == [*range(n - 1), n + 2]

@@ -18,7 +18,6 @@ from beaver_ftc.loop.stepping import diagnose
 from beaver_ftc.scenario.schema import Scenario
 
 TRAVEL_RAD = np.array([[-0.52, -0.49, -0.44, -0.1], [0.52, 0.49, 0.44, 1.03]])
-SURFACES = ("aileron", "elevator", "rudder")
 
 
 @kernel

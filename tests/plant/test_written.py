@@ -6,24 +6,14 @@ import numpy as np
 import pytest
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.plant.adapter import FlightState, Plant, body_axes
+from beaver_ftc.plant.adapter import Plant, body_axes
 from beaver_ftc.plant.true_aircraft import configure
 from beaver_ftc.scenario.schema import load
 from trainer import trainer
 
-BANKED = {
-    "alpha_rad": 0.1, "beta_rad": -0.05, "p_rad_s": 0.3, "q_rad_s": -0.2, "r_rad_s": 0.15, "phi_rad": 0.4,
-    "theta_rad": -0.1, "psi_rad": 1.1, "aileron_rad": 0.06, "elevator_rad": -0.08, "rudder_rad": 0.07,
-    "flap_rad": 0.2, "engine_rpm": 1900.0, "manifold_pressure_inhg": 22.0,
-}  # fmt: skip
-
 
 def written(plant):
     return dict(sorted(plant.written.items()))
-
-
-def banked(**more):
-    return FlightState(50.0, 1500.0, **{**BANKED, **more})
 
 
 def test_body_axes_turn_by_yaw_then_pitch_then_roll():

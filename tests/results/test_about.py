@@ -12,7 +12,7 @@ from beaver_ftc.scenario.schema import Scenario
 LOSS = {"type": "loss_of_effectiveness", "actuator": "elevator", "magnitude": 0.4, "at_s": 12}
 STUCK = {"type": "stuck", "actuator": "elevator", "at_s": 12}
 RUDDER = {"type": "bias", "actuator": "rudder", "bias_deg": 2, "at_s": 14}
-ALL, PAIRS = {"fault_class": "all"}, {"fault_class": "all", "pairs": True}
+ALL = {"fault_class": "all"}
 
 
 def _hints(

@@ -47,28 +47,6 @@ def test_what_differs_is_named_with_line_both_texts_and_command_and_is_written()
     assert made.text == PAGE
 
 
-BROKEN = {
-    "<!-- printed: fly -->\ntext\n": "what is printed has no end",
-    "<!-- printed: fly -->\n<!-- printed: sail -->\n<!-- /printed -->\n": "a mark inside what is printed",
-    "<!-- printed: fly -->\n```text\n<!-- /printed -->\n": "what is printed has no end",
-    "<!-- /printed -->\n": "no mark: <!-- /printed -->",
-    "<!-- printd: fly -->\n": "no mark: <!-- printd: fly -->",
-    "<!-- printed: -->\n": "no mark",
-    "a <!-- remark --> b\n": "no mark",
-    "never closed <!-- from x\n": "no mark",
-    "<!-- from x: fly -->\n": "no number is taken from x",
-    "a <!--=x path-->1<!--/-->\n": "no document is called x",
-    "a <!--=x path-->1\n": "no mark",
-    "a <!--=x-->1<!--/-->\n": "no mark of a number",
-    "a <!--=x path *many-->1<!--/-->\n": "no mark of a number",
-    "<!-- from x: fly -->\n<!-- from x: sail -->\na <!--=x p-->1<!--/-->\n": "a second document is called x",
-    "<!-- from x: fly -->\n<!--=x p-->1<!--/-->\n": "begins the line",
-    "<!-- from x: fly -->\n- <!--=x p-->1<!--/-->\n": "begins the line",
-    "<!-- printed: fly | dear -->\n<!-- /printed -->\n": "dear without a probe",
-    "<!-- printed: fly | dear | prob: x -->\n<!-- /printed -->\n": "no option of what is dear: prob: x",
-}
-
-
 DEAR = "<!-- printed: fly far | dear | probe: fly near | at {} -->\n```text\n12 h\n```\n<!-- /printed -->\n"
 NEAR = {"fly near": Output("0.02"), "fly far": Output("13 h")}
 STANDS = DEAR.format(f"1ab 2026-01-02 {digest_of('0.02')}")

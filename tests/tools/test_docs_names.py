@@ -27,15 +27,3 @@ WRONG = {
 @pytest.mark.parametrize("span", [*GOOD, *WRONG])
 def test_a_name_of_the_project_passes_and_another_is_found(span):
     assert names.wrong(span, SHOWN) == WRONG.get(span)
-
-
-BARE = {
-    "It takes 0.31 s.": True,
-    "It takes <!--=case detection.delay_s .2f-->0.31<!--/--> s.": False,
-    "<!-- printed: fly -->\n| a | 34 dB |\n<!-- /printed -->": False,
-    "In `duration_s: 0.31` it is.": False,
-    "```yaml\nduration_s: 0.31\n```": False,
-    "Another cites [Zhang2005]. It takes 0.31 s.": True,
-    "See section 4.2 and equations (14) and (15).": False,
-    "On 2026-11-20 with JSBSim 1.3.3.": False,
-}

@@ -44,7 +44,7 @@ def advance_probe(probe, wanted, t):
         memory.from_s = t
     phase = config.step * memory.probed
     at_rest = phase % (2.0 * pi) < config.step
-    if memory.probed > 0 and at_rest and (not wanted or memory.probed >= config.frames):
+    if at_rest and (not wanted or memory.probed >= config.frames):
         memory.deflection, memory.probed, memory.to_s = 0.0, 0, t
         return
     memory.deflection = 0.5 * config.amplitude * (1.0 - np.cos(phase))

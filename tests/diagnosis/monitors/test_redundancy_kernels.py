@@ -11,7 +11,10 @@ from beaver_ftc.diagnosis.monitors.numbering import (
     ANGLE_TEST,
     BETA_TEST,
     CLIMB_TEST,
+    COUNTERPART,
     DENSITY_TEST,
+    DUPLICATE,
+    DUPLICATE_TOLERANCE,
     I_AIRSPEED,
     I_ALPHA,
     I_BETA,
@@ -130,3 +133,13 @@ def test_momentary_errors_of_the_attitude_stay_within_bounds_that_remember_long(
     monitor["decay"] = 0.0, 0.99, 0.9999
     for ratio, _ in compared(monitor, readings):
         assert (ratio[TURN_TEST : TURN_TEST + 3] <= 1.0).all()
+
+
+@pytest.mark.parametrize("share", [0.99, 1.01])
+def test_duplicates_differ_by_no_more_than_both_their_errors(share):
+    monitor, readings = new_monitor(0.02), np.zeros(N_SENSORS)
+    monitor["e"] = np.arange(N_SENSORS) * 0.01
+    for i, j, within in zip(DUPLICATE, COUNTERPART, DUPLICATE_TOLERANCE, strict=True):
+        readings[i] = readings[j] + share * (within + 0.01 * (i + j))
+    redundancy.compare_duplicates(monitor, readings, np.ones(N_SENSORS, int))
+    assert ((monitor["ratio"][N_EQUATIONS:] > 1.0) == (share > 1.0)).all()

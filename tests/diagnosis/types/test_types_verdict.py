@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from kernels import new_fdi, on, put_on
 
+from beaver_ftc.diagnosis import conclusion
 from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
 from beaver_ftc.diagnosis.types import (
     GIVE_UP,
@@ -173,6 +174,15 @@ def test_what_is_done_about_a_surface(kinds, accommodation_mode):
     assert modes.choose_mode(one(*kinds)[1]) == accommodation_mode
 
 
+def test_without_a_sensor_offsets_stay_that_stay_by_themselves():
+    surfaces = new_case(aileron=(STUCK,), elevator=(BIAS,), rudder=(OSCILLATORY,), flap=(SLOW,))["types"]
+    out = np.zeros(1, conclusion.assessment_dtype(4)).view(np.recarray)[0]
+    out["accommodation_mode"] = GIVE_UP, SUBTRACT_OFFSET, SUBTRACT_OFFSET, WAIT_FOR_SURFACE
+    out["offset"] = out["lag"] = 0.1
+    conclusion.hold_assessment(out, surfaces)
+    assert (out["offset"].tolist(), out["lag"].any()) == ([0.1, 0.1, 0.0, 0.0], False)
+
+
 # Examining frames.
 
 
@@ -219,3 +229,13 @@ def test_two_equations_say_where_ailerons_and_rudder_were(seed):
     fdi["bank"]["output"]["innovation"][YAW] = 9.0
     on(pairs.locate_lateral, fdi)
     assert fdi["types"]["pair"]["lateral_outside"]
+
+
+def test_of_two_surfaces_found_in_one_frame_the_verdict_has_the_first():
+    fdi = new_case(aileron=(STUCK,), rudder=(STUCK,))
+    fdi["types"]["surface"]["not_at_position"][[AILERON, RUDDER]] = 1
+    pair = fdi["types"]["pair"]
+    pair["group_alarm"][pairs.LATERAL_GROUP], pair["first_pitch"] = 1, NO_SURFACE
+    found = on(pairs.decide_pairs, fdi, fdi["verdict"], 3.0)
+    assert found == (fdi["layout"]["position"][AILERON], 3.0, STUCK, 3.0)
+    assert fdi["types"]["surface"]["status"]["is_isolated"][RUDDER]

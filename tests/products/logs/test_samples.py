@@ -10,7 +10,7 @@ from beaver_ftc_logs.recording import Column, LoggedFailure, RecordedFlight
 from products.logs import small
 from products.logs.test_signals import T_S, turning, yawed
 
-WING, WING_RATES = small.vehicle(), tuple(small.RATES.values())
+WING = small.vehicle()
 
 
 def column(t_s, values, note=""):

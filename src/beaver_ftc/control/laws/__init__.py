@@ -40,9 +40,8 @@ def prepare(control, assessment, prediction, mode, t):
     given_up = remains < least and assessment.diagnoses_all_types
     at_once = control.reference.memory.active or output.authority_lost or given_up
     allocation.hand_over_pitch(control.allocation, mode == MODE_REALLOCATED, at_once, remains, least)
-    if control.probe.config.frames > 0:
-        wanted = assessment.pitch_undecided and config.uses_verdict and not config.informed
-        advance_probe(control.probe, wanted, t)
+    wanted = assessment.pitch_undecided and config.uses_verdict and not config.informed
+    advance_probe(control.probe, wanted, t)
 
 
 @apart

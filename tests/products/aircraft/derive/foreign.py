@@ -73,18 +73,6 @@ def elevator(low, high, at_stops=(-1, 1)):
     return text[:pitch] + text[pitch:].replace("fcs/elevator-pos-rad", "fcs/elevator-pos-norm")
 
 
-def renamed():
-    """The Navion whose surfaces have names of the author's own."""
-    text = NAVION
-    for name, own in (
-        (LEFT, "fcs/posAil_rad"),
-        ("fcs/elevator-pos-rad", "fcs/posElev_rad"),
-        ("fcs/rudder-pos-rad", "fcs/posRud_rad"),
-    ):
-        text = text.replace(name, own)
-    return text
-
-
 def wing():
     """The Navion without a rudder."""
     text = controlled(NAVION, without="fcs/rudder-pos-rad")

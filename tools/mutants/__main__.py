@@ -17,7 +17,7 @@ import scipy.stats
 
 from tools.mutants.making import Mutant
 from tools.mutants.reach import Reach, few_examples, reach
-from tools.mutants.scope import GLUE, MODES, SOURCES, drawn, left_out, stale
+from tools.mutants.scope import FLOWN, GLUE, MODES, SOURCES, drawn, flown, left_out, stale
 from tools.mutants.trial import HANGS, KILLED, outcome
 
 LEAST = 85.0  # per cent
@@ -72,7 +72,10 @@ def _trials(
     """How often mutants of each kind came to each end, tried side by side."""
     few_examples()
     ends: Counter[tuple[str, str]] = Counter()
-    tests = [{mode: found[mode].reaching(mutant) for mode in MODES[kind]} for kind, mutant in taken]
+    tests = [
+        {mode: flown(mutant.file) if mode == FLOWN else found[mode].reaching(mutant) for mode in MODES[kind]}
+        for kind, mutant in taken
+    ]
     with ProcessPoolExecutor(options.jobs, mp_context=get_context("fork")) as pool:
         done = pool.map(outcome, [mutant for _, mutant in taken], tests)
         for number, ((kind, mutant), end) in enumerate(zip(taken, done, strict=True), 1):

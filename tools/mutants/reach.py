@@ -23,7 +23,7 @@ import hypothesis
 import pytest
 
 from tools.mutants.making import Mutant
-from tools.mutants.scope import COMPILED, PLAIN, ROOT, SOURCES, assigned, runs_at_import, tests, uses
+from tools.mutants.scope import COMPILED, KEPT, PLAIN, ROOT, SOURCES, assigned, runs_at_import, tests, uses
 from tools.mutants.trial import SURVIVED, in_a_child, processor_s, pytest_quietly, turn_to
 
 SLOW_S = {
@@ -35,7 +35,6 @@ HANGS_S = 900.0  # of processor for the tests of one file, far more than the lim
 EXAMPLES = 4
 APART = ("beaver_ftc.compiled",)
 SHARED = ("conftest.py", "kept.py")
-KEPT = ROOT / ".mutants"
 
 
 class Reach:

@@ -17,13 +17,17 @@ ROOT = Path(__file__).parents[2]
 SOURCES = ROOT / "src"
 CORE = SOURCES / "beaver_ftc"
 TESTS = ROOT / "tests"
+KEPT = ROOT / ".mutants"
 EQUIVALENT = Path(__file__).with_name("equivalent.yaml")
 
 KERNELS, GLUE = "kernels", "glue"
-# How tests run: kernels in plain Python, since to compile each mutant would take all day; or compiled, once
-# for all, where no kernel changes.
-PLAIN, COMPILED = "plain", "compiled"
-MODES = {KERNELS: (PLAIN,), GLUE: (PLAIN, COMPILED)}
+# How tests run: in plain Python, since to compile each mutant of a kernel would take all day; or compiled,
+# once for all, where no kernel changes. A kernel whose mutant no plain test finds is compiled, for the other
+# tests of its folder, and for flights beside the executable reference and beside each other.
+PLAIN, COMPILED, FLOWN = "plain", "compiled", "flown"
+FLIGHTS = ("diagnosis/test_short_flights.py", "relations/test_*.py", "reference/test_*.py")
+FILE_S = 30.0  # of processor for a file of tests that fly, roughly
+MODES = {KERNELS: (PLAIN, FLOWN), GLUE: (PLAIN, COMPILED)}
 
 # Compiled modules that plain Python reaches in a second.
 QUICK = ("design", "diagnosis", "control")
@@ -106,6 +110,20 @@ def tests(mode: str) -> list[Path]:
     if mode == PLAIN:
         return sorted(plain)
     return sorted(set(TESTS.rglob("test_*.py")) - plain - set((TESTS / "acceptance").rglob("*.py")))
+
+
+def flown(file: Path) -> dict[str, float]:
+    """The test files that fly a compiled mutant of a module, and their times, s."""
+    own = sorted(set((TESTS / folder_of_tests(file)).glob("test_*.py")) - set(tests(PLAIN)))
+    files = [file for pattern in FLIGHTS for file in sorted(TESTS.glob(pattern))]
+    return {path.relative_to(ROOT).as_posix(): FILE_S for path in dict.fromkeys([*own, *files])}
+
+
+def folder_of_tests(file: Path) -> str:
+    """The folder below tests/ that mirrors a module's: `products/NAME` for beaver_ftc_NAME."""
+    package, _, folder = file.relative_to(SOURCES).parent.as_posix().partition("/")
+    product = package.removeprefix(CORE.name).removeprefix("_")
+    return "/".join(part for part in ("products" if product else "", product, folder) if part)
 
 
 @cache

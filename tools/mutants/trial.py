@@ -1,6 +1,7 @@
 """The trial of a mutant: a copy of the package with the mutant in it, and the tests that reach it."""
 
 import contextlib
+import math
 import os
 import signal
 import sys
@@ -14,9 +15,11 @@ import numba
 import pytest
 
 from tools.mutants.making import Mutant
-from tools.mutants.scope import COMPILED, CORE, PLAIN, ROOT, SOURCES
+from tools.mutants.scope import COMPILED, CORE, FLOWN, KEPT, PLAIN, ROOT, SOURCES, folder_of_tests
 
-BUDGET_S = {PLAIN: 90.0, COMPILED: 60.0}  # of tests for one mutant, by what they take with the true module
+# Of tests for one mutant, by what they take with the true module; all that a mode has.
+BUDGET_S = {PLAIN: 90.0, COMPILED: 60.0, FLOWN: math.inf}
+MARKS = {FLOWN: ("-m", "not nightly and not acceptance")}  # of whole files, those by day
 ENDLESS_S, ENDLESS = 30.0, 3.0  # of processor, and times what the tests take with the true module: it hangs
 
 SURVIVED, KILLED, HANGS, UNREACHED = "LIVES", "killed", "hangs", "NO TEST"
@@ -46,13 +49,15 @@ def _outcome(mutant: Mutant, mode: str, seconds: dict[str, float]) -> str:
             failed = note.read().strip()
         if ended != KILLED or _is_sound(mode, failed):
             return ended
+        if failed not in tests:  # one of a file, which fails without the mutant too
+            return SURVIVED
         tests.remove(failed)
     return UNREACHED
 
 
 def _chosen(file: Path, seconds: dict[str, float], budget_s: float) -> list[str]:
     """The tests within a budget: those of the folder of the module first, quick ones before slow ones."""
-    own = f"tests/{_place_of_tests(file)}/"
+    own = f"tests/{folder_of_tests(file)}/"
     taken, spent = [], 0.0
     for test in sorted(seconds, key=lambda test: (not test.startswith(own), seconds[test])):
         spent += seconds[test]
@@ -60,13 +65,6 @@ def _chosen(file: Path, seconds: dict[str, float], budget_s: float) -> list[str]
             break
         taken.append(test)
     return taken
-
-
-def _place_of_tests(file: Path) -> str:
-    """The folder below tests/ that mirrors a module's: `products/NAME` for beaver_ftc_NAME."""
-    package, _, folder = file.relative_to(SOURCES).parent.as_posix().partition("/")
-    product = package.removeprefix(CORE.name).removeprefix("_")
-    return "/".join(part for part in ("products" if product else "", product, folder) if part)
 
 
 @cache
@@ -81,7 +79,7 @@ def _is_sound(mode: str, test: str) -> bool:
 def _run(mode: str, file: Path, source: str, tests: list[str], note: Path, limit_s: float) -> str:
     def tried() -> int:
         turn_to(mode)
-        return pytest_quietly(["-x", *tests], [_Note(note)])
+        return pytest_quietly(["-x", *MARKS.get(mode, ()), *tests], [_Note(note)])
 
     with _instead(file, source):
         return in_a_child(tried, limit_s)
@@ -124,6 +122,8 @@ def _first(folder: str) -> Iterator[None]:
 def turn_to(mode: str) -> None:
     """Let this process, and those that it starts, compile kernels, or run them as plain Python."""
     os.environ["NUMBA_DISABLE_JIT"] = "1" if mode == PLAIN else "0"
+    if mode == FLOWN:
+        os.environ["XDG_CACHE_HOME"] = str(KEPT / "cache")  # the user's is for true code
     numba.config.reload_config()
 
 

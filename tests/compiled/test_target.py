@@ -7,18 +7,7 @@ import os
 import subprocess
 import sys
 
-import numba
-import numpy as np
-import pytest
-
 from beaver_ftc import compiled
-
-
-@pytest.mark.parametrize("version", ["0.67.2", "0.680.0", "1.0.0"])
-def test_of_another_version_nothing_is_borrowed(monkeypatch, version):
-    monkeypatch.setattr(numba, "__version__", version)
-    assert compiled._own_target.__wrapped__() is None
-
 
 KERNELS = """
 import sys
@@ -99,20 +88,3 @@ def test_a_flight_without_what_is_borrowed_is_the_same():
     flights = [run(["-c", FLIGHT], compiler)[0] for compiler in ("", "numba")]
     assert len(flights[0]) > 100
     assert flights[0] == flights[1]
-
-
-def test_code_for_size_is_shorter_gives_the_same_and_is_kept_apart(tmp_path):
-    def add_up(x, weights):
-        for i in range(x.size):
-            x[i] += weights[i] * x[i]
-        return x[0]
-
-    quick, short = (compiled.compile_into(tmp_path, add_up, for_size=for_size) for for_size in (False, True))
-    given = np.arange(1.0, 10.0), np.linspace(0.5, 1.0, 9)
-    x = given[0].copy()
-    assert short(x, given[1]) == add_up(given[0], given[1])
-    np.testing.assert_array_equal(x, given[0])
-    quick(x, given[1])
-    lines = [next(iter(each.overloads.values())).library.get_asm_str().count("\n") for each in (quick, short)]
-    assert lines[1] < 0.9 * lines[0]  # by the processor
-    assert len(list(tmp_path.glob("add_up-*"))) == 2

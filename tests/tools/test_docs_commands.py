@@ -1,29 +1,13 @@
-"""Commands of the marks: each once, in a folder of its own, within its time; tables and constants."""
+"""Constants of the code that pages cite."""
 
 import json
 
-from tools.docs import pages
-from tools.docs.commands import Output, outputs
+from tools.docs.commands import Output
 from tools.docs.constants import constants
 from tools.docs.marks import parsed
 from tools.docs.refresh import Refreshed, Wanted
 
 from beaver_ftc.control.laws import loop_design
-
-FAULTS = {
-    "exit 2": "ends with status 2: nothing on standard error",
-    "echo no such thing >&2; exit 3": "ends with status 3: no such thing",
-    "true": "prints nothing",
-    "echo x; python -c 'raise ValueError'": "ends with status 1: ValueError",
-    "pwd": "prints a path of this machine",
-    f"echo {pages.ROOT}/docs": "prints a path of this machine",
-    "echo missed; exit 1": "",
-}
-
-
-def test_what_cannot_be_used_says_why():
-    found = outputs(FAULTS)
-    assert {line: output.fault for line, output in found.items()} == FAULTS
 
 
 def test_a_changed_gain_turns_the_page_that_cites_it_red(tmp_path, monkeypatch):

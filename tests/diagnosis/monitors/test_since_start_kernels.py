@@ -10,6 +10,7 @@ from true_flight import UNITS, compared, new_monitor, true_flight
 
 from beaver_ftc.diagnosis.monitors import initial_errors
 from beaver_ftc.diagnosis.monitors.initial_errors import (
+    EVIDENCE,
     H_AIRSPEED,
     H_ALPHA,
     H_BETA,
@@ -17,7 +18,10 @@ from beaver_ftc.diagnosis.monitors.initial_errors import (
     H_THETA,
     INITIAL_SENSOR,
     N_INITIAL,
+    PHI_IN_FLOW,
+    THETA_IN_FLOW,
 )
+from beaver_ftc.diagnosis.monitors.numbering import I_AIRSPEED, RPM_TEST
 from beaver_ftc.plant.instruments import SENSORS
 
 SAMPLES = 100
@@ -62,3 +66,38 @@ def test_a_sound_flight_shows_each_reading_to_be_sound():
     for i, little in SHOWN.items():
         assert initial["E"][i] < little < initial["E_start"][i], i
     assert initial["E"][H_AIRSPEED] < 0.2
+
+
+# Largest effect of a small error on each test, over its bound H: at least this; 0 where H is of second order.
+OF_H = np.array(
+    [
+        [0, 0, 0, 0, 0, 0, 0, 0.9, 0.7, 0, 0.9], [0, 0, 0, 0, 0, 0, 0.9, 0.8, 0.9, 0, 0.9],
+        [0, 0, 0, 0, 0, 0, 0.7, 0.9, 0.8, 0, 0.9], [0.4, 0.9, 0.9, 0.09, 0.9, 0.9, 0.8, 0.4, 0.9, 0, 0.9],
+        [0.9, 0.04, 0.1, 0.9, 0.3, 0.1, 0.9, 0.1, 0.4, 0, 0.9],
+    ]
+)  # fmt: skip
+# Its effect on the tests of a row of EVIDENCE together, over C: in the middle of the samples at least this.
+OF_C = [0.99, 0.99, 0.98, 0.98, 0.6, 0.98, 0.98, 0.9, 0.9, 0.9]
+
+
+def test_a_small_error_has_the_effect_that_is_computed():
+    """By the difference between a flight with the error and one without, in both senses of the error."""
+    of_H, of_C = np.zeros((N_INITIAL, RPM_TEST)), [[] for _ in OF_C]
+    for seed, x in ((3, 0.02), (4, -0.02)):
+        sound = true_flight(np.random.default_rng(seed), SAMPLES, 0.01)
+        without = [residual for _, residual in compared(new_monitor(0.01, 1e-3 * UNITS), sound)]
+        for i, sensor in enumerate(INITIAL_SENSOR):
+            readings, monitor = sound.copy(), new_monitor(0.01, 1e-3 * UNITS)
+            readings[:, sensor] += x * (sound[0, sensor] if i == H_AIRSPEED else 1.0)
+            initial = monitor["initial"]
+            for k, (_, residual) in enumerate(compared(monitor, readings)):
+                effect, V = abs((residual - without[k]) / x)[:RPM_TEST], readings[k, I_AIRSPEED]
+                of_H[i] = np.maximum(of_H[i], (OF_H[i] > 0.0) * effect / (initial["H"][i] + 1e-12))
+                for n, (h, first, last) in enumerate(EVIDENCE):
+                    if h == i:
+                        in_m_s = [1.0, V, V] if n in (PHI_IN_FLOW, THETA_IN_FLOW) else 1.0
+                        shown = np.linalg.norm(effect[first : last + 1] * in_m_s)
+                        of_C[n].append(shown / (abs(initial["C"][n]) + 1e-12))
+    assert ((of_H >= OF_H) & (of_H <= 1.02)).all(), of_H
+    middle = np.median(of_C, axis=1)
+    assert ((middle >= OF_C) & (middle <= 1.05)).all(), middle

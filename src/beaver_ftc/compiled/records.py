@@ -1,8 +1,8 @@
-"""Records, and those of them that have room for as much as an aircraft or a flight needs.
+"""Types of records. A record with *room* has parts whose sizes an aircraft or a flight gives.
 
-What has the same size in each comes first in such a record, always in the same places. Behind it is what has
-not: where each part begins and how long it is follows from the record's NumPy type. Compiled code asks for
-these numbers (`places`) when Python calls it, and is the same for all sizes: sized_types.py.
+The fields whose size is fixed come first, always in the same places. Behind them are the parts: where each
+begins and how long it is follows from the NumPy type of the record. Compiled code reads these numbers
+(`places`) when Python calls it, and is the same for all sizes (sized_types.py).
 """
 
 import functools
@@ -18,7 +18,8 @@ FEWEST_LINES = 4  # fewer are not worth the gap before them
 
 
 class Room(int):
-    """How many there is room for: in compiled code no constant."""
+    """A size that differs from record to record, so that it is no constant in compiled code. Sums, products
+    and whole quotients of such a size are such sizes; other operations would give a constant."""
 
     def __add__(self, other: int) -> "Room":
         return Room(int(self) + int(other))
@@ -33,7 +34,9 @@ class Room(int):
 
 
 class Part(NamedTuple):
-    """Of a record: what changes in size. dims: of an array, None where its size does."""
+    """A field whose size differs from record to record: its name, the type of its elements (`of`), and, of an
+    array, its dimensions, None for each that `places` says. An array of records with room has the one
+    dimension None, also if its length is fixed."""
 
     name: str
     of: Union[np.dtype, "Shape"]
@@ -41,13 +44,14 @@ class Part(NamedTuple):
 
     @property
     def n_places(self) -> int:
-        """How many of the numbers of `places` are about it: see there."""
+        """How many numbers of `places` are about this part."""
         within = 0 if isinstance(self.of, np.dtype) else self.of.n_places + bool(self.dims)
         return 1 + sum(size is None for size in self.dims) + within
 
 
 class Shape(NamedTuple):
-    """What records of all sizes have in common: the type of what is the same in each, and the rest."""
+    """What the records of one type have in common at all sizes: the type of the fixed fields, and the
+    parts."""
 
     fixed: np.dtype
     parts: tuple[Part, ...]
@@ -63,8 +67,8 @@ class Shape(NamedTuple):
 
 @functools.cache
 def short_digest(value: Any) -> str:
-    """A name for what a value prints: of a large record's shape it takes 2 ms, and is asked for at each use
-    of the record while code is compiled."""
+    """A name for what a value prints. It is kept, since each use of a record asks for it while code is
+    compiled, and the shape of a large record takes 2 ms."""
     return hashlib.sha256(repr(value).encode()).hexdigest()[:16]
 
 
@@ -72,15 +76,16 @@ _shapes: dict[np.dtype, Shape] = {}
 
 
 def record(**fields: Any) -> np.dtype:
-    """The type of a record: what each field is, `int`, `float` or the type of another record, or, of an array
-    of floats, its shape. Of other arrays what they are made of comes first.
+    """The type of a record. A field is `int`, `float` or the type of another record; or an array: the shape
+    of one of floats, or (type, *shape). A size that is a Room makes its field a part, behind the fixed
+    fields.
 
-    record(n=int, share=float, decay=8, damping=(3, 3), fired=(int, 13), test=(TEST, 13))
+    record(n=int, share=float, decay=8, damping=(3, 3), fired=(int, 13), test=(TEST, 13), theta=Room(4))
     """
     given = {name: _kind_and_shape(field) for name, field in fields.items()}
-    changing = {name for name, field in given.items() if _changes(*field)}
-    order = sorted(given, key=changing.__contains__)
-    formats = [np.dtype((kind, tuple(map(int, shape)))) for kind, shape in map(given.__getitem__, order)]
+    changing = [name for name, field in given.items() if _changes(*field)]
+    order = [name for name in given if name not in changing] + changing
+    formats = [np.dtype((given[name][0], tuple(map(int, given[name][1])))) for name in order]
     dtype = np.dtype({"names": order, "formats": formats}, align=True)
     if changing:
         dtype = _on_lines(dtype, changing)
@@ -90,8 +95,8 @@ def record(**fields: Any) -> np.dtype:
 
 
 def _on_lines(dtype: np.dtype, parts: Collection[str]) -> np.dtype:
-    """The same record, each of these parts on a line of the processor's cache if it fills several: of an
-    array that begins between two, each access of a vector instruction touches both."""
+    """The same record, in which each of these parts that fills several lines of the processor's cache begins
+    on one: otherwise many accesses of vector instructions touch two lines."""
     kinds = {name: dtype[name] for name in dtype.names or ()}
     offsets, end = [], 0
     for name, kind in kinds.items():
@@ -108,12 +113,14 @@ def _up_to(step: int, size: int) -> int:
     return -(-size // step) * step
 
 
-def _kind_and_shape(given: Any) -> tuple[Any, tuple[int, ...]]:
-    parts = given if isinstance(given, tuple) else (given,)
-    return (float, parts) if isinstance(parts[0], int) else (parts[0], parts[1:])
+def _kind_and_shape(field: Any) -> tuple[Any, tuple[int, ...]]:
+    """The type of a field of `record`, and its shape, () for a single value."""
+    items = field if isinstance(field, tuple) else (field,)
+    return (float, items) if isinstance(items[0], int) else (items[0], items[1:])
 
 
 def _changes(kind: Any, shape: tuple[int, ...]) -> bool:
+    """Whether the size of a field differs from record to record."""
     return any(isinstance(size, Room) for size in shape) or shape_of(kind) is not None
 
 
@@ -128,8 +135,8 @@ def _part(name: str, kind: Any, shape: tuple[int, ...]) -> Part:
 
 
 def sized(function: Callable[..., np.dtype]) -> Callable[..., np.dtype]:
-    """For a function that returns the type of a record for sizes, numbers or tuples of such: each type is
-    made once, and compiled code of one is compiled code of all."""
+    """Decorate a function that returns the type of a record for sizes, numbers or named tuples of numbers.
+    The sizes become Rooms, so compiled code for one type is compiled code for all. A type is kept."""
     arguments = inspect.signature(function)
 
     @functools.lru_cache
@@ -147,18 +154,23 @@ def _rooms(size: Any) -> Any:
 
 
 def shape_of(dtype: Any) -> Shape | None:
-    """What a record's type shares with those of other sizes; None of one that has but one size."""
+    """What the type of a record shares with those of other sizes; None for a type without room."""
     return _shapes.get(dtype) if isinstance(dtype, np.dtype) else None
 
 
 def places(dtype: np.dtype) -> Iterator[int]:
-    """Of each part that changes in size: where it begins, bytes from the record's own beginning, each size
-    that is not given, of several records the bytes from one to the next, and of records their own places."""
+    """The numbers by which compiled code finds the parts of a record, for each part:
+
+    - its offset from the beginning of the record, bytes
+    - each size whose dimension is None
+    - of an array of records with room: the bytes from one to the next
+    - of records with room: the places in the first of them
+    """
     for part in _shapes[dtype].parts:
         field, offset = dtype.fields[part.name][:2]  # type: ignore[index]
         element, sizes = field.subdtype or (field, ())
         yield offset
-        yield from (size for size, given in zip(sizes, part.dims, strict=True) if given is None)
+        yield from (size for size, fixed in zip(sizes, part.dims, strict=True) if fixed is None)
         if isinstance(part.of, Shape):
             if part.dims:
                 yield element.itemsize

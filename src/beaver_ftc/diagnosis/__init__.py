@@ -46,8 +46,8 @@ class Measured(NamedTuple):
     - `y` (4 + signals,): angle of attack rad, sideslip rad, airspeed m/s, dynamic pressure Pa, and the
       signals that the aircraft declares. The Beaver declares one, `dpt`.
 
-    The other fields are means over the frame that ends at `t_s`. In the first frame, `acceleration` and
-    `contribution` are zero.
+    The next three fields are means over the frame that ends at `t_s`. In the first frame, `acceleration` and
+    `contribution` are zero, and `eta_bar` is the bound at this instant.
 
     - `acceleration` (3,) rad/s²: angular acceleration f + G u of the design model. With x_before, the `x` of
       the previous frame, the innovation is (x - x_before) / dt - acceleration.

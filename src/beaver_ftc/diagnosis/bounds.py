@@ -6,8 +6,9 @@ coefficient times powers of measured signals. If every factor v has an error dv 
     |prod (v + dv) - prod v| <= prod (|v| + e) - prod |v|
 
 and the sum of these over the terms bounds |F(truth) - F(measured)| at this state. The sum of prod |v| is the
-design model with |v| in place of each factor, and that of prod (|v| + e) the same with |v| + e: the bound
-is the difference of two evaluations of one model. If all errors have one sign, each term reaches its bound.
+design model with |v| in place of each factor, and that of prod (|v| + e) the same with |v| + e, or |v| - e of
+the airspeed, which divides the rates: the bound is the difference of two evaluations of one model. If each
+error has the sign of its factor, each term reaches its bound.
 The same bound serves the isolation estimators: a lost share of a surface multiplies its terms by 1 + theta in
 [0, 1], and with them their error.
 
@@ -174,7 +175,7 @@ def add_declared_bound(err, x, y, u, eta):
         eG = G_worst - G_measured
 
     F_measured, F_worst (3,) rad/s2: the design model of magnitudes, at the magnitudes |v| as measured and at
-    the worst ones, |v| + e.
+    the worst ones, |v| + e, of the airspeed V - e.
     """
     fill_magnitudes(err, x, y, u)
     for v in range(2):
@@ -198,8 +199,8 @@ def add_published_bound(x, model, c, b, w_E, eta):
 
     x (3,) rad/s: rates p, q, r; c (3,): error share of the inertia coupling; C_i x_j x_l rad/s2: its main
     product, Pqr q r, Qpr p r or Rpq p q; b (3,) rad/s2: constant; w_E rad/s: rate of the Earth; kappa_i: sum
-    of the factors of the products of two rates on axis i, in pitch plus twice the larger of those of p^2 and
-    r^2, at least 1; rho: ROUNDING_RAD_S2.
+    of the magnitudes of the factors of products of two rates on axis i, in pitch with twice the larger of
+    those of p^2 and r^2, at least 1; rho: ROUNDING_RAD_S2.
     """
     p, q, r = x[0], x[1], x[2]
     total = abs(p) + abs(q) + abs(r)
@@ -271,8 +272,8 @@ def inertia_bounds(tol: float, mass: MassProperties) -> np.ndarray:
     """Largest change (12,) of the inertia coefficients, for every inertia within its relative tolerance
     `tol`.
 
-    Each coefficient is monotonic in each inertia while the others are constant, so the largest change is at a
-    corner.
+    Each coefficient of an aircraft's inertias is monotonic in each of them while the others are constant, so
+    the largest change is at a corner.
     """
     nominal = np.array(inertia_coefficients(mass))
     worst = np.zeros(nominal.size)
@@ -330,7 +331,8 @@ def fill_errors(err: np.void, declared: Declared, model: np.void) -> None:
 
 
 def fill_engine_errors(err: np.void, declared: Declared) -> None:
-    """Fill in the errors of dpt if errors are declared of an instrument from which dpt is computed.
+    """Fill in the errors of dpt if the aircraft has instruments of the engine, and errors are declared of one
+    from which dpt is computed.
 
     The engine may have any setting between the initial one and its highest manifold pressure.
     """

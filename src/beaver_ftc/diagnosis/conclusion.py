@@ -36,9 +36,9 @@ from beaver_ftc.diagnosis.types import (
 
 MAX_WITHDRAWN = 16
 
-# Why an isolation is withdrawn: an estimator refutes the surface, all types are excluded on it, a sensor is
-# found broken, a plug-in decides so; or for none of these reasons, if another surface has become possible
-# too.
+# Why an isolation is withdrawn: an estimator refutes the surface; all types on it, or all of the named type,
+# are excluded; a sensor is found broken; a plug-in decides so; or for none of these reasons, if another
+# surface has become possible too.
 SURFACE_REFUTED, TYPES_REFUTED, SENSOR_BROKEN, PLUGIN_DECIDES, SEVERAL_POSSIBLE = range(5)
 
 # An isolation that was withdrawn, or the type of one: surface; type, -1 if open; its beginning and end, s.
@@ -254,7 +254,7 @@ def assess_surface(out, types, layout, fies, s):
     SCALE_COMMAND       effectiveness
     GIVE_UP             effectiveness 0 at once; offset: its deflection, rad
     SUBTRACT_OFFSET     offset: its deflection error, rad
-    WAIT_FOR_SURFACE    lag: its deflection error in the last frame, rad
+    WAIT_FOR_SURFACE    lag: its deflection error in the last frame, rad; lags: 1
     """
     surf = types.surface[s]
     possible = verdict.can_be_faulty(surf)
@@ -276,7 +276,7 @@ def isolated_theta(cfg, conclusion, layout, fies, stat, s):
     """The estimated theta of the isolated loss of surface s, and its information, 1 / variance.
 
     The statistical detector gives the most likely theta. If its estimates are not used, theta is that of the
-    isolation estimator, whose variance is not known: its information is 0.
+    isolation estimator. Its uncertainty is bounded and not random, so its information counts as 0.
     """
     if weighs_statistics(stat, cfg.authority):
         return statistical.estimate_loss(stat.block, s)

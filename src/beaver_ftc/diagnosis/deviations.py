@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from beaver_ftc.design.context import DeclaredErrors
 
 _FURTHER_READINGS = ("phi", "theta", "psi", "ax", "ay", "az", "altitude")  # what plug-ins read beyond SIGNALS
+LARGE_ANGLE_RAD = 0.3  # attitudes and incidences of up to 17 deg
 _GYRO_OF = dict(zip(RATE_SIGNALS, AXES, strict=True))
 
 
@@ -71,7 +72,7 @@ def air_rotation_slopes(model: DesignFunctions, y: np.ndarray) -> np.ndarray:
 def model_error_std(
     model: np.ndarray, y: np.ndarray, u: np.ndarray, sigma: np.ndarray, dC: np.ndarray, du: np.ndarray
 ) -> np.ndarray:
-    """Standard deviation (3,) rad/s2 of a = f + G u at rest (x = 0), y and u, all errors e independent:
+    """Standard deviation (3,) rad/s2 of a = f + G u at rest (x = 0) and at y, u, all errors e independent:
 
         sqrt(sum over e of (a(e) - a(0))^2)
 
@@ -96,22 +97,20 @@ def flow_noise(errors: SensorErrors, V: float) -> np.ndarray:
     """Standard deviation (2,) rad of the noise of the flow's angles in level axes, computed from vanes,
     airspeed and attitude:
 
-        hypot(sigma_vane, sigma_attitude) + angle (sigma_V / V + sigma_phi)
+        hypot(sigma_vane, sigma_attitude) + LARGE_ANGLE_RAD (sigma_V / V + sigma_phi)
 
-    An error of pitch attitude or heading turns the flow as much as an error of a vane. V: airspeed, m/s;
-    angle: 0.3 rad.
+    An error of pitch attitude or heading turns the flow as much as an error of a vane. V: airspeed, m/s.
     """
-    angle = 0.3  # rad: attitudes and incidences of up to 17 deg
     pairs = (("alpha", "theta"), ("beta", "psi"))
     sigma = [hypot(errors[vane].random, errors[attitude].random) for vane, attitude in pairs]
-    return np.array(sigma) + angle * (errors["V"].random / V + errors["phi"].random)
+    return np.array(sigma) + LARGE_ANGLE_RAD * (errors["V"].random / V + errors["phi"].random)
 
 
 def gust_noise(sigma: np.ndarray, model: np.void, y: np.ndarray, u: np.ndarray, b: float) -> np.ndarray:
     """Standard deviation (3,) rad/s2 of the estimated effect of a gust, by the noise sigma (2,) rad of the
     flow's angles:
 
-        sqrt((F_q s_q)^2 + (F_r s_r)^2)      s_q = pi V / 4 b sigma_alpha      s_r = pi V / 3 b sigma_beta
+        sqrt((F_q s_q)^2 + (F_r s_r)^2)      s_q = pi V sigma_alpha / (4 b)      s_r = pi V sigma_beta / (3 b)
 
     s: noise of the rotation of the air, rad/s (gusts.py); F (3,) 1/s: d(f + G u) / d rate; b: span, m; V:
     airspeed, m/s.
@@ -127,9 +126,9 @@ def moment_axis(term: Term) -> int:
 
 
 def coefficient_bounds(declared: Declared, model: np.void, y: np.ndarray, u: np.ndarray) -> np.ndarray:
-    """Tolerance (terms,) of the coefficient of each term of the moments. It covers the
-    constant errors of coefficients, inertia and gyros, and the slope errors of the air data, whose constant
-    offsets have columns of their own (rows.py); y, u in trim:
+    """Tolerance (terms,) of the coefficient of each term of the moments. It covers the constant errors of
+    coefficients, inertia and gyros, and the slope errors of gyros and air data. The constant offsets of the
+    air data have columns of their own (rows.py). y, u in trim:
 
         dC + (e_inertia + e_signals) |C| + [constant term] sum_j |d(Cl, Cm, Cn) / d(ph, qh, rh)_j| e_j
 
@@ -144,8 +143,7 @@ def coefficient_bounds(declared: Declared, model: np.void, y: np.ndarray, u: np.
     dI = InertiaCoefficients(*inertia_bounds(declared.inertia, declared.mass))
     nominal = inertia_coefficients(declared.mass)
     e_inertia = max(dI.Pl / nominal.Pl, dI.Qm / nominal.Qm, dI.Rn / nominal.Rn)
-    # e_inertia is a number of NumPy, so the list is added as an array
-    relative = e_inertia + [_signal_error(errors, term) for term in aircraft.moments]
+    relative = e_inertia + np.array([_signal_error(errors, term) for term in aircraft.moments])
     tol = declared.coefficients.absolute(aircraft.moments, C) + relative * C
     b, c = aircraft.geometry.span_m, aircraft.geometry.chord_m
     slopes = np.abs(coefficient_slopes(model, np.zeros(3), y, u))[:, PH : RH + 1]

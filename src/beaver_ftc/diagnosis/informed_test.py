@@ -18,8 +18,9 @@ through the same filter as R c. The part of the fault that they can explain is n
 
 with s and R scaled by S^-1/2 and the frames stacked.
 
-If sensors are in doubt, a gyro may have any error. The evidence that no gyro causes the flight is the
-least deflection of the three tests that each do without one gyro, and use the attitude instead.
+If sensors are in doubt, a gyro may have any error. The evidence that no gyro explains the flight is the least
+deflection of three tests, which each do without one gyro and use the attitude instead; this file makes one
+of them at a time.
 
 The unexplained acceleration of the published bound is a sinusoid of unknown frequency. Here it is a
 first-order process of the same power, with the time constant UNEXPLAINED_MEMORY_S.
@@ -43,7 +44,7 @@ from beaver_ftc.design.table import N_SIGNALS, signals
 from beaver_ftc.diagnosis.gusts import MIN_UNMEASURED_SHARES
 
 UNEXPLAINED_MEMORY_S = 0.1
-MIN_GYRO_STD_RAD_S, MIN_ATTITUDE_STD_RAD = 1e-5, 1e-5  # noise that perfect instruments are assumed to have
+MIN_GYRO_STD_RAD_S, MIN_ATTITUDE_STD_RAD = 1e-5, 1e-5  # added to the noise of each, so that none is perfect
 # Frames until the covariance S of the innovations has settled. At 50, 100 and 200 Hz, with tactical-grade
 # sensors in light turbulence, S changes after frame 400 by less than 1e-8 of itself, without a gyro, too.
 _SETTLING_FRAMES = 400

@@ -74,7 +74,7 @@ FORCE_RECORD = record(
     vane=2, vane_roll=float,
     var_trim=2,  # variance of f_hat in trim by noise, with that of the vane and without it, (rad/s2)2
     L=3, f_hat=float,
-    G_trim=MAX_SURFACES,  # magnitude of e by each surface in trim, per rad
+    G_trim=MAX_SURFACES,  # bound on e by each surface, per rad, in trim with signals of at most 1
     var_acc=float,  # variance of e by noise of the accelerometer, which does not change with the pressure
     n_Z=int,  # number of its columns in rows.py, without that of the drift
 )  # fmt: skip

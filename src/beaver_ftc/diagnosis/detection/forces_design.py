@@ -24,7 +24,7 @@ DRIFT_CHANGE_PER_S = 0.3  # share of a drift that may change within a second
 SIDESLIP_RATE_TOLERANCES = {False: 0.05, True: 0.2}
 VANE_TOLERANCE = 0.1  # relative error of the effect of a vane's error: its column is that of the trim
 
-TrimState = tuple[np.ndarray, np.ndarray, np.ndarray]  # x (3,) rad/s, y and u rad
+TrimState = tuple[np.ndarray, np.ndarray, np.ndarray]  # x (3,) rad/s, y (readings), u rad
 
 
 def configure_forces(
@@ -63,8 +63,9 @@ def _configure_force(
 
     f_all (7,): slopes of the predicted force, in the order of `_force_slopes`; f_vane rad/s2 per rad: that
     with the force's vane; Q_angle rad2/s: intensity of the drift of the flow angle from inertial motion, its
-    first part by the change of the drift in 1 s; drift rad/s: bound on that drift; walk rad2/s: intensity of
-    the change of that angle by gusts; std m/s2: noise of the accelerometer.
+    first part by the change of the drift in 1 s, squared, in each second; drift rad/s: bound on that drift;
+    walk rad2/s: intensity of the change of that angle by gusts; std m/s2: noise of the accelerometer. G_trim
+    takes the signals of a term, besides the deflection, as 1.
     """
     y = trim[1]
     aircraft = declared.aircraft
@@ -193,8 +194,10 @@ def _force_coefficient(declared: Declared, name: str, state: TrimState) -> float
 
 
 def _force_slopes(declared: Declared, name: str, trim: TrimState) -> np.ndarray:
-    """(7,): its derivatives with alpha, beta (1/rad), airspeed (s/m), rates (s/rad), dpt, by differences."""
-    (x, y, u), step = trim, 1e-5
+    """(7,): the derivatives of coefficient `name` with alpha, beta (1/rad), airspeed (s/m), rates (s/rad) and
+    dpt, by differences."""
+    x, y, u = trim
+    step = 1e-5
     states = [(x, y + step * e, u) for e in np.eye(3, y.size)]
     states += [(x + step * e, y, u) for e in np.eye(3)]
     states += [(x, y + step * (np.arange(y.size) == DPT), u)]

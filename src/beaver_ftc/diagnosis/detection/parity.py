@@ -29,9 +29,9 @@ view across the column of the vane, with the gust estimated from the forces, or 
 flow angle that integrated inertial motion gives.
 
 A broken accelerometer changes a force and no rate. If accelerometers may break, a force raises no alarm, and
-the rates use no gust estimate that rests on accelerometers. An alarm of the rates then shows that another
-part is broken, and after it the views count as usual. Forces that are known or suspected to be wrong are not
-used.
+blocks and the views of an axis use no gust estimate that rests on accelerometers. An alarm of the rates then
+shows that another part is broken, and after it the views count as usual. Forces that are known or suspected
+to be wrong are not used.
 
 What each view may do, by what is subtracted from its rates (`source`), if the forces are used:
 
@@ -203,8 +203,8 @@ def project_views(views, noise, rows, forces, gust, vaned, vaneless, V):
     """Bring direction, noise, signatures and regressors of each view in use to the elapsed frame; V m/s.
 
     gust, vaned, vaneless: the gust estimates (rows.py). A view of RAW rates takes the rotation of the air
-    from `gust`, the others from `vaned`; a view without vanes has the drift of `vaneless`. The order matters:
-    the direction is turned before the rows are projected on it.
+    from `gust`, the others from `vaned`; if forces are in use, a view without vanes has the drift of
+    `vaneless`. The order matters: the direction is turned before the rows are projected on it.
     """
     for view in views:
         b = view.block
@@ -255,7 +255,7 @@ def changes_view(view, forces, s, G):
     of the frame before, so m' G of this frame is not exactly 0.
     """
     m = view.block.m[0]
-    effect = project(G, m, False)
+    effect = project(G, m, False)  # the three rates of m; project loops over its first argument
     for i, f in enumerate(forces.component):
         effect += m[SIDE_FORCE + i] * f.G[s]
     return view.nulled != s and effect != 0.0

@@ -34,7 +34,7 @@ from beaver_ftc.scenario.sensors import frames_apart, sensor_words
 # Errors of a reading: field of the record -> name in the declaration
 ERRORS = {"e_zero": "worst", "e_slope": "slope", "const": "steady"}
 MAX_AIRSPEED_OVER_TRIM = 1.4  # largest airspeed of a flight, as a share of that in trim
-# Rate at which the attitude corrects a replaced body rate, if the attitude's noise is declared
+# Rate at which the attitude corrects a replaced body rate, if noise or rounding of the attitude is declared
 RATE_GAIN_PER_S = 3.0
 # Number of readings in a row, each equal to the one before, that a sound sensor does not give: without
 # rounding of its reading, and with a noise of more than a quarter of its resolution.

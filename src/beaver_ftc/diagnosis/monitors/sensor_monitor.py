@@ -193,8 +193,8 @@ def mark_isolated(mon, verdict, i, t):
 
 @kernel
 def name_gyro(mon, verdict, i, t):
-    """Isolate gyro i at t s, which attitude.py has found. The conclusion about surfaces is void, unless a
-    surface has been isolated: the alarm of the surfaces was that of the gyro."""
+    """Isolate gyro i at t s, which attitude.py has found. The conclusion about surfaces is void, as the alarm
+    of the surfaces was that of the gyro; not so if a surface has been isolated and `raise_alarm` keeps it."""
     o = mon.output
     mark_isolated(mon, verdict, i, t)
     if o.keeps_surface and verdict.isolated_estimator < 0:
@@ -205,7 +205,8 @@ def name_gyro(mon, verdict, i, t):
 @kernel
 def add_turn(mon, att, y):
     """Add the residuals of turning of this sample, rad, to the comparison att of attitude and rates
-    (attitude.py). Near the vertical the attitude shows no turn, and the comparison restarts.
+    (attitude.py), and take over its turn_max. Near the vertical the attitude shows no turn: the comparison
+    restarts, and turn_max, which is then not read, stays.
     """
     if too_steep(mon, y):
         attitude.restart(att)
@@ -300,8 +301,8 @@ def estimate_reading(mon, pred, y, i):
 
 @kernel
 def estimate_rate(mon, pred, i):
-    """Body rate about axis i, rad/s: the rate of the sample before, corrected by the attitude, and its change
-    since by the model:
+    """Body rate about axis i, rad/s, for a gyro that is marked as replaced: the rate of the sample before,
+    corrected by the attitude, and its change since by the model:
 
         y_i = y_past_i + gain residual_i / h + h acc_i,    acc = f + G u [+ F_known - F]
 

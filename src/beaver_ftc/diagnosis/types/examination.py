@@ -51,7 +51,8 @@ from beaver_ftc.diagnosis.types.registry import (
 
 @kernel
 def restart_surface(srf):
-    """Restart the diagnosis of one surface, with no knowledge: every type remains, with its whole range."""
+    """Restart the diagnosis of one surface: every type remains, with its whole range, and no evidence counts.
+    The observations and released types stay, until the next frames replace them."""
     srf.sets.excluded[:] = 0
     srf.last.lo, srf.last.hi = srf.actuator.reach_lo, srf.actuator.reach_hi
     ev = srf.evidence
@@ -93,7 +94,8 @@ def record_commands(types, commands, ext):
 
 @kernel
 def observe_surfaces(types, layout, est, nu, nu_max):
-    """Find where each surface was in the elapsed frame, or block, if it alone is at fault."""
+    """Find where each surface was in the elapsed frame, or block, if it alone is at fault. The observations
+    move on by one: judged becomes earlier, last becomes judged."""
     anomalous = not estimators.eta_explains(nu, nu_max)
     for s, srf in enumerate(types.surface):
         copy_observation(srf.earlier, srf.judged)
@@ -205,8 +207,9 @@ def extend_block(types, layout, est, nu, bound):
 
 @kernel
 def count_rest(types, s):
-    """A surface given up, and commanded to where it happens to be, shows by its quiet that it does not swing.
-    The fault must be declared to stay: of one that may go, the quiet may be that of health.
+    """Count a frame at rest of surface s, which is given up and commanded to where it happens to be: its
+    quiet shows that it does not swing. The fault must be declared to stay: of one that may go, the quiet may
+    be that of health.
 
         surface agrees (`agrees_at_rest`)             the frame counts as an anomaly of it
         and another surface, each may be the sole     it counts as an anomaly of the other: with one fault,

@@ -1,4 +1,4 @@
-"""The rows of the fault types as arrays, and their kernels as one kernel for each slot.
+"""The rows of the fault types as arrays, and their kernels as one kernel for each part.
 
 Every file under `table/` is read: a new type is one more row. The number h of a type is its place in TYPES.
 """
@@ -42,14 +42,15 @@ def _parts_of(name: str) -> dict[int, Kernel]:
 
 
 # Columns of the table, by type; `FaultType` says what they are.
-MODE, STOP_SIDE, REST, HOLDS = (
-    _type_column(name)
-    for name in ("accommodation_mode", "stop_direction", "evidence_at_rest", "holds_surface")
-)
+MODE = _type_column("accommodation_mode")
+STOP_SIDE = _type_column("stop_direction")
+REST = _type_column("evidence_at_rest")
+HOLDS = _type_column("holds_surface")
 SHOW_HALF_CYCLES = _type_column("show_half_cycles")
 WAIT_HALF_CYCLES = _type_column("wait_half_cycles")
 FOLLOWS_COMMAND = _type_column("follows_command")
 MUST_SHOW = np.array([row.has_shown is not None for row in TYPES])
+# CAN_LOOK_LIKE[h, j]: whether type h can look like type j. SERVES[mode, h]: whether a mode serves type h.
 CAN_LOOK_LIKE = np.array([[other.name in row.can_look_like for other in TYPES] for row in TYPES])
 SERVES = np.array(
     [[mode in (row.accommodation_mode, *row.other_accommodation_modes) for row in TYPES] for mode in range(4)]
@@ -70,8 +71,7 @@ NAMED = np.array([*(np.array(SAME_NAME) == h for h in range(N_TYPES)), ALL])
 ERROR_TYPES = np.array(
     sorted(_parts_of("deflection_error"), key=lambda h: TYPES[h].deflection_error_precedence), dtype=int
 )
-# SERVES[mode, h]: whether a mode serves type h; END_TYPE[h]: the type that h becomes at the end of its range,
-# -1 for none.
+# END_TYPE[h]: the type that h becomes at the end of its range, -1 for none.
 END_TYPE = np.array([TYPE_NAMES.index(row.end_type) if row.end_type else -1 for row in TYPES])
 
 

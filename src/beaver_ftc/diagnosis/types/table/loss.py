@@ -41,7 +41,7 @@ def deflection_range(c, srf, h, k):
 def varying_interval(c, srf, h, k):
     """UNLIMITED_SET if some 1 + theta in [0, 1] explains the judged frame, else EMPTY_SET.
 
-    Over a block of frames in which u changes its sign, the mean p may be any: an effectiveness that varies
+    Over a block of frames in which u changes its sign, the mean p is not tested: an effectiveness that varies
     within the block weighs both signs differently.
     """
     lo, hi = consistent_interval(c, srf, h, k)

@@ -1,8 +1,8 @@
 """Rate limit: p moves only towards its command, at any rate down to the slowest declared.
 
 A slower surface counts as stuck: the two types are each other's limit, and only a least rate distinguishes
-them. `consistent_interval` reads the judged frame, or block of frames (srf.judged, srf.commands[1]). Symbols:
-types/__init__.py.
+them. `consistent_interval` reads the judged frame, or block of frames (srf.judged), and the commands of it
+and of the one before (srf.commands). Symbols: types/__init__.py.
 """
 
 from beaver_ftc.compiled import kernel, record
@@ -18,7 +18,8 @@ def reset_memory(srf, h):
 
 @kernel
 def consistent_interval(c, srf, h, k):
-    """A slow surface never moves away from its command, so while it stands on one side it comes nearer.
+    """EMPTY_SET if the surface was seen to move away from its command, else UNLIMITED_SET: a slow surface
+    never moves away, so while it stands on one side it comes nearer.
 
         1  away: the surface was seen farther from its command than (M.lo, M.hi) of the frame before allows
         2  (M.lo, M.hi) is narrowed by the least motion in this frame (`narrow_by_motion`)
@@ -29,7 +30,8 @@ def consistent_interval(c, srf, h, k):
     restarts with what is seen. If a frame has several JSBSim steps, the first still follows the command of
     the frame before (`commands_of_frame`).
     """
-    judged, M, side, away = srf.judged, srf.rate_limit, side_of_commands(c, srf), False
+    judged, M = srf.judged, srf.rate_limit
+    side, away = side_of_commands(c, srf), False
     if side == 0 or side != M.side or k != M.k_last + 1:
         M.lo, M.hi = judged.lo, judged.hi
     else:

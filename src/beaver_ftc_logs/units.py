@@ -1,4 +1,5 @@
-"""Units that a vehicle file may name, and their sizes in SI; a share of travel has the unit 1."""
+"""Units that a vehicle file may name, and their sizes in SI; a share of travel has the unit 1. Units of time,
+the usual pulse of a servo, and factors of mistakes."""
 
 from math import pi
 
@@ -35,8 +36,8 @@ UNIT_FACTORS = (-1.0, 1.0 / _RAD_PER_DEG, 1000.0, _RAD_PER_DEG, 1e-3)
 
 
 def nearest_unit(kind: str, si_factor: float, max_ratio: float) -> str | None:
-    """The unit of a kind whose size in SI is nearest to si_factor by ratio; None if the ratio exceeds
-    max_ratio."""
+    """The unit of a kind whose size in SI is nearest to si_factor, a positive number, by ratio; None if the
+    ratio exceeds max_ratio."""
     sizes = {name: size for name, (unit_kind, size) in SI_UNITS.items() if unit_kind == kind}
     ratios = {name: max(si_factor / size, size / si_factor) for name, size in sizes.items()}
     nearest = min(ratios, key=lambda name: ratios[name])

@@ -20,7 +20,7 @@ from beaver_ftc_logs.runs import runs_between
 from beaver_ftc_logs.scoring import score_against_labels
 
 _DEFAULT_FALSE_ALARMS = 1.0  # 1/h, if the vehicle file states no rate
-# Under a law that the fit has not seen, an alarm needs this multiple of the evidence by theory.
+# In still air, under a law that the fit has not seen, an alarm needs this multiple of the evidence by theory.
 # docs/results/choices.md has the flights that chose it.
 _LORDEN_FACTOR = 2.0
 _CREDIBLE_MASSES = (0.5, 0.6, 0.7, 0.8, 0.9, 0.95)  # masses that are tried
@@ -61,10 +61,15 @@ def add_ranges_and_threshold(parts: Parts, model: Model) -> Model:
 
 
 def _gain_sd(parts: Parts, model: Model, folds: Sequence[Fold]) -> Floats:
-    """Standard error of the gain of each group, (G,), 1 in the model, at most GAIN_SD_CAP: that of the fit
-    and, under other laws, the root mean square of the deviations in each of several flights left out. The
-    largest error by which a fit may misread a gain, sqrt(3) times its standard deviation, counts as the
-    deviation of one more flight."""
+    """Standard error of the gain of each group, sd (G,), of a gain that is 1 in the model:
+
+        sd = min(sqrt(s^2), GAIN_SD_CAP)                        without other laws
+        sd = min(sqrt(s^2 + mean over k of d_k^2), ...)         with other laws, k = 0 to K
+
+    s: standard error of the fit. d_1 to d_K: deviations of the gain from 1 in each of several flights left
+    out. d_0: the largest error by which the fit may misread the gain, sqrt(3) times its standard deviation
+    under the noise model with the largest.
+    """
     variance = group_gain_sd(fit_of(parts, model), model) ** 2
     if model.vehicle.other_laws:
         misreads = [noise.misreads for noise in model.colours] or [[0.0] * len(model.groups)]
@@ -93,9 +98,9 @@ def _choose_threshold(tail: extremes.PeakTail | None, target: float, model: Mode
 def _cross_validate(
     flights: Sequence[extremes.PeaksAndHours], target: float | None, model: Model
 ) -> Document:
-    """Test of the threshold on parts left out: how many would have alarmed, each at the threshold by the tail
-    of the others, and how often. Empty if no rate is requested, if there is a single part, or if the others
-    of a part have too few peaks.
+    """Test of the threshold on parts left out: how many would have alarmed, each at the threshold that the
+    others choose, and how often. Empty if there is no rate, if there is a single part, or if the others of a
+    part have too few peaks.
     """
     tails = [extremes.fit_peak_tail([*flights[:i], *flights[i + 1 :]]) for i in range(len(flights))]
     if target is None or len(flights) < 2 or not all(tails):
@@ -115,7 +120,8 @@ def _healthy_peaks(fold: Fold) -> extremes.PeaksAndHours:
     rows, h.
 
     p (n, H): probabilities of the hypotheses, of which the last is that nothing answers the commands; z (n,):
-    evidence for a fault; rows: numbers of the healthy rows in which something answers.
+    evidence for a fault; rows: numbers of the rows in which something answers and no label shows a fault. The
+    sum of the alarm restarts with each run of these rows.
     """
     bank = build_bank(fold.model)
     samples = fold.held_out.samples

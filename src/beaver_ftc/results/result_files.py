@@ -72,7 +72,7 @@ def write_report_files(
     """Draw the figures and the report of a result folder that holds its log and its scenario.
 
     to: another folder to write into. painters: the processes that draw the figures; without them this process
-    draws. formats: of the figures. sections: sections of studies in the report.
+    draws. formats: endings of the figures, none for no figures. sections: of studies, for the report.
     """
     from beaver_ftc.results.figures import pictures_of
     from beaver_ftc.results.painters import drawing
@@ -88,15 +88,16 @@ def write_report_files(
 
 def add_report(folder: Path, document: Document) -> str:
     """Draw figures and report of an existing result folder. Returns an empty text; if drawing fails, the
-    reason, and the folder stays as it was.
+    reason.
 
-    Both are drawn in a hidden folder, and renamed only if the result folder has not been replaced meanwhile.
+    Both are drawn in a hidden folder, and moved into the result folder once they are complete, unless that
+    has been replaced meanwhile.
     """
     failed: list[Exception] = []
     with (
         TemporaryDirectory(prefix=partial_prefix(folder.name), dir=folder.parent) as hidden,
         locked(Path(hidden)),
-        note_failure_and_go_on(failed, folder, "report.html"),
+        note_failure_and_go_on(failed, Path(hidden), "report.html"),
     ):
         drawn_for = folder.stat()
         write_report_files(folder, document, Path(hidden))

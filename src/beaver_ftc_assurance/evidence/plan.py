@@ -1,4 +1,5 @@
-"""The plan of evidence: requirements on scenarios and sweeps. All mistakes of its file are reported at once.
+"""The plan of evidence: requirements on scenarios and sweeps. First the mistakes of its keys and values are
+reported together, then those of its sources, formulas and expectations.
 
 A *source* is a scenario or a sweep, out of the plan itself, built in, or from another file.
 """
@@ -125,12 +126,12 @@ class _Reading:
                     text = f"{source.given} is a scenario, allowed with a bar of type sweep: sweeps"
                     self._problem((*place, "over", k), text)
                 if formula:
-                    self._fits(formula, source, (*place, "formula"))
+                    self._check_formula(formula, source, (*place, "formula"))
                 if requirement.expect is not None:
                     checked = self._expect(requirement.expect, source, (*place, "expect"))
                     if checked:  # the same for each source: a source only adds problems
                         expect[requirement.id] = checked
-        self._unused()
+        self._check_unused()
         sources_by_name = self._by_name()
         self._raise()
         return EvidencePlan(self._file, sources_by_name, over, expect, formulas, self._given, sha256)
@@ -160,7 +161,7 @@ class _Reading:
             self._problem(("requirements",), f"{flights} flights, allowed: at most {MOST_FLIGHTS}")
         return sources
 
-    def _unused(self) -> None:
+    def _check_unused(self) -> None:
         """Add a mistake for each entry of `flights` that no requirement names. The entry is read, too, for
         its own mistakes."""
         for name in self._file.flights:
@@ -228,9 +229,9 @@ class _Reading:
             self._problem((*at, "formula"), str(error))
             return None
 
-    def _fits(self, formula: Formula, source: Source, at: Location) -> None:
+    def _check_formula(self, formula: Formula, source: Source, at: Location) -> None:
         """Add a mistake if the logs of a source are too short for a formula, or lack one of its columns. A
-        formula that looks ahead without end fits each log."""
+        formula that looks ahead without end fits each log. A source that cannot fly has no columns."""
         ahead = formula.looks_ahead_s
         duration_s = source.base.duration_s
         if duration_s < ahead < inf:

@@ -1,8 +1,8 @@
 """An ArduPilot dataflash log (.bin, or .log as text). A column is named `MESSAGE.Field`.
 
-A message that comes from several instances (field `I` or `C`) has the instance's number with its name, from
-the second on: `IMU1.GyrX`. Time counts from the first message with a stamp. Reading needs pymavlink: the
-extra `flights`.
+A message that comes from several instances (_INSTANCE_FIELDS) has the instance's number behind its name,
+unless this is 0: `IMU1.GyrX`. Time counts from the earliest message with columns. Reading needs pymavlink:
+the extra `flights`.
 """
 
 from collections.abc import Iterator
@@ -30,7 +30,7 @@ def read(path: Path, wanted: Wanted = None) -> RecordedFlight:
     """
     params: Parameters = {}
     with package_errors_as_bad_input(path, "dataflash log", "pymavlink", "ArduPilot's .bin or .log"):
-        import_module("pymavlink")  # here, since `dataflash` may have been imported before
+        import_module("pymavlink")  # for its error, which an earlier import of `dataflash` would hide
         from beaver_ftc_logs.readers import dataflash
 
         messages = dataflash.read_messages(path)
@@ -40,9 +40,9 @@ def read(path: Path, wanted: Wanted = None) -> RecordedFlight:
                 add_parameter(params, name, value)
         topics = {
             topic: part
-            for name, of_name in messages.items()
-            if name not in _IGNORED_MESSAGES and _TIME_FIELD in of_name.fields
-            for topic, part in _topics_of_instances(name, of_name)
+            for name, messages_of_name in messages.items()
+            if name not in _IGNORED_MESSAGES and _TIME_FIELD in messages_of_name.fields
+            for topic, part in _topics_of_instances(name, messages_of_name)
         }
         if not topics:
             reason = "holds no message with a time stamp, allowed: a dataflash log of a flight"

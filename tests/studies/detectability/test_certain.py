@@ -24,9 +24,9 @@ from beaver_ftc.studies.detectability.certain import (
     least_in_window,
     mismatch,
 )
-from beaver_ftc.studies.detectability.in_trim import alike
+from beaver_ftc.studies.detectability.in_trim import alike, alike_in_words
 from beaver_ftc.studies.detectability.places import at, places_study, with_aircraft
-from beaver_ftc.studies.detectability.places_shown import answer, geometry
+from beaver_ftc.studies.detectability.places_shown import answer
 from beaver_ftc.studies.engine.study import run_study
 from flying import loss, scenario
 from samples import samples
@@ -184,7 +184,7 @@ def test_what_is_told_apart_no_deflection_of_the_other_explains(column, other, b
 def test_the_rates_never_tell_elevator_from_flap_and_accelerometers_do():
     (pair,) = alike(scenario())
     assert pair["surfaces"] == ("elevator", "flap")
-    assert geometry([pair]) == [
+    assert alike_in_words([pair]) == [
         "elevator and flap have similar effects on the rates: "
         "the rates never distinguish them, accelerometers do"
     ]

@@ -13,19 +13,21 @@ A law flies with our default scheme, over faulted flights:
     J = geometric mean of e / e_oracle
 
 e: RMS tracking error of all axes after the fault, deg/s. e_oracle: that of the oracle in the same flight. A
-lost aircraft counts as e / e_oracle = `LOST`. A candidate is admissible if
+lost aircraft counts as e / e_oracle = `LOST`, or as 1 if the oracle loses it, too. A candidate is admissible
+if
 
-    - without a fault, it keeps the gain and phase margins that the scenario requires of the default law, at
-      every surface that leads an axis, at the slowest and the fastest airspeed of the envelope;
+    - without a fault, it keeps the gain and phase margins that the first of these flights requires of the
+      default law, at every surface that leads an axis, at the slowest and the fastest airspeed of the
+      envelope: all flights of a grade have the same aircraft and the same requirements;
     - the RMS rate of all surfaces together, over the same flights, is at most `EFFORT` times that of the
       default law; tested if the trial does not end early.
 
 A candidate that is not admissible costs `INADMISSIBLE` or more; the cost grows with the violation.
 
 The flight of a plug-in ends with a false alarm, because nothing after it changes its cost. A trial ends early
-once it cannot win. The trial of a detector, whose parts only add up, ends when the sum exceeds the lowest J
-so far. The trial of a law ends when J over `LEAST_FLIGHTS` or more flights is `HOPELESS` times the lowest J
-so far. The cost of such a trial is extrapolated from the flights until then.
+if it cannot win or hardly can. The trial of a detector, whose parts only add up, ends when the sum exceeds
+the lowest J so far. The trial of a law ends when J over `LEAST_FLIGHTS` or more flights is `HOPELESS` times
+the lowest J so far. The cost of such a trial is extrapolated from the flights until then.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -56,7 +58,7 @@ from beaver_ftc.studies.compare.trial import (
 from beaver_ftc.studies.margins import Margin
 
 # Cost of a detector.
-DELAY_S = 1.0  # an alarm with this delay costs half as much as a missed fault
+DELAY_S = 1.0  # delay of an alarm at which the term of d is half of that of a missed fault
 # Cost of a law.
 LOST = 100.0  # e / e_oracle of a flight that loses the aircraft, and the largest of any flight
 EFFORT = 1.1  # largest RMS surface rate over that of the default law
@@ -94,7 +96,7 @@ class _FalseAlarm(Exception):
 
 def _end_with_false_alarm(loop: Loop) -> Callable[[], None]:
     """Watch a flight, as an argument of `fly`: end it with the first false alarm of its plug-in. The returned
-    function is called after each frame, and once more at the end, when it has no effect."""
+    function is called after each frame if there is a plug-in, and once at the end, without effect."""
     plugins = loop.plugin_frame
     is_false = Truth.of(loop.scenario).onset.is_false
 
@@ -148,7 +150,7 @@ class DetectorCost(Cost):
         self._faulted = sum(bool(case.scenario.faults) for case in cases)
 
     def __call__(self, values: Values) -> float:
-        """J with these values, or its extrapolation if the trial ends early."""
+        """J with these values, its extrapolation if the trial ends early, or FAILED."""
         total = 0.0
         try:
             for n, (_, part) in enumerate(self._flights(values), 1):
@@ -161,7 +163,8 @@ class DetectorCost(Cost):
         return total
 
     def _part(self, n: int, result: Result) -> float:
-        """(d / (d + DELAY_S) + w) / 2 over the number of faulted flights, plus a over that of all flights."""
+        """(d / (d + DELAY_S) + w) / 2 over the number of flights with a fault, plus a over that of all. A
+        flight that ends before its fault has no first part."""
         cost = result.false_alarm / len(self._cases)
         if result.faulted:
             d = result.delay_s
@@ -179,7 +182,7 @@ class LawCost(Cost):
         self._oracle, self._effort_allowed = yardsticks(grade, most, draw, draws)
 
     def __call__(self, values: Values) -> float:
-        """J with these values."""
+        """J with these values, or its extrapolation, or the cost in its place."""
         try:
             short = self.shortfall(values)
             return INADMISSIBLE * (1.0 + short) if short else self._tracking(values)
@@ -199,9 +202,9 @@ class LawCost(Cost):
         return max(0.0, *(1.0 if isnan(share) else 1.0 - share for share in shares))
 
     def _tracking(self, values: Values) -> float:
-        """J, or the cost of a candidate whose surfaces move too fast."""
-        results = list[Result]()
-        logs = list[float]()
+        """J, or the cost of a candidate whose surfaces move too fast, or FAILED if their rate is not
+        finite."""
+        results, logs = list[Result](), list[float]()
         for result, part in self._flights(values):
             results.append(result)
             logs.append(part)

@@ -1,8 +1,8 @@
 """A flight under the nominal law, played back to any detector.
 
 The nominal law reads no verdict, so that one recorded flight serves all detectors. Of the statistic of a
-detector, `Trace` keeps the values that decide about alarms at any level: the largest value before the fault,
-and after it each value that is larger than all before.
+detector, `Trace` keeps the values that decide about alarms at any level: before the fault, and again from it
+on, each value that is larger than all before.
 """
 
 from collections.abc import Mapping, Sequence
@@ -28,7 +28,7 @@ Seen = list[tuple[Measured, np.ndarray]]
 
 
 class Recorder:
-    """A detector that keeps its arguments and never raises an alarm."""
+    """A detector that keeps its context, and its arguments where its steps are called; it raises no alarm."""
 
     def __init__(self) -> None:
         self.seen: Seen = []
@@ -45,9 +45,9 @@ class Recorder:
 
 @dataclass(frozen=True)
 class Trace:
-    """The statistic of a detector over one flight, which alarms above the level 1.
+    """The statistic of a detector over one flight. A detector as it ships alarms above the level 1.
 
-    - before: largest value before the fault, or in a whole healthy flight.
+    - before: largest value before the fault, or in a whole healthy flight; at least 0.
     - records: (delay s, value) of each value since the fault that is larger than all since the fault.
     - faulted: whether the fault begins in the flight. healthy_s: time until then.
     - rises: (time s, value) of each value before the fault that is larger than all before it.

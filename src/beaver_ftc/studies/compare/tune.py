@@ -4,8 +4,8 @@ All methods, ours and rivals, have the same search (search.py) with the same num
 seed, and the costs of criteria.py. They are tuned on the sets `calibration-GRADE`, whose seeds are in no set
 that is compared. Each grade of flights is tuned separately: exact sensors and ideal actuators; actuators that
 lag; errors of sensors and air. The key `tunable` in plugins.yaml, or in the class of a plug-in, names the
-parameters. A method keeps the values with which it starts unless the search finds values that cost
-`LEAST_GAIN` less.
+parameters; those of our statistical detector are OF_STATISTICAL. A method keeps the values with which it
+starts unless the search finds values that cost `LEAST_GAIN` less.
 
 With `Search.draw`, a method is tuned on other draws, and its row has the gain (gain.py). The record of the
 values that ship, benchmarks/tuning.json, lists the gains of these later searches as `again`.
@@ -132,8 +132,8 @@ def tune(methods: Sequence[Method], how: Search, workers: int, progress: Progres
 
 
 def tune_method(method: Method, how: Search) -> Document:
-    """The row of a method: the chosen values, the fields of `Found` (search.py), the number of flights of a
-    trial, and the margins of a law.
+    """The row of a method: the chosen values, the fields of `Found` (search.py), the number of flights of the
+    set, of which a law flies those with a fault, and the margins of a law.
 
     On another draw than 0, the row also has the gain of the values found, with the fields of `gain_of`,
     unless neither these nor the start are admissible. `flights` is then the number of flights on which both
@@ -177,8 +177,8 @@ def read_tuned(path: Path) -> Document:
     """The values in a file that `compare --tune` wrote. Raises BadInput."""
     try:
         grades = _GRADES.validate_python(read_json(path)["grades"], strict=True)
-        unknown = set(grades) - set(FLIGHT_GRADES)
-        if unknown | set().union(*grades.values()) - set(TUNED_FILE_KEY_BY_PLUGIN_GROUP.values()):
+        kinds = set().union(*grades.values())
+        if set(grades) - set(FLIGHT_GRADES) or kinds - set(TUNED_FILE_KEY_BY_PLUGIN_GROUP.values()):
             raise ValueError("a grade or a kind that is not known")
         return dict(grades)
     except (OSError, ValueError, KeyError, TypeError) as error:
@@ -186,8 +186,8 @@ def read_tuned(path: Path) -> Document:
 
 
 def as_text(document: Document) -> str:
-    """A line for each method and grade; then remarks about widened ranges and searches that the budget
-    ended."""
+    """A line for each method and grade; then remarks about widened ranges, searches that found nothing
+    better, and searches that the budget ended."""
     columns = (*COLUMNS, *(GAINS if document["draw"] else ()), VALUES)
     table, rows = tabulated(columns, document["methods"])
     remarks = [sentence for row in document["methods"] for sentence in _remarks(row)]

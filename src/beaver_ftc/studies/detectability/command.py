@@ -177,7 +177,7 @@ class Detectability(StudyCommand):
         """The sentences, or else the page as text; and the folder of the files."""
         shown = schemes_shown if self.grid else places_shown if self.within is None else sizes_shown
         lines = document.get("answers") or [
-            as_text(shown.page_of(document)[1]), *places_shown.geometry(document.get("alike", ())),
-            *places_shown.of_engines(document.get("engines", ())),
+            as_text(shown.page_of(document)[1]), *in_trim.alike_in_words(document.get("alike", ())),
+            *in_trim.failures_in_words(document.get("engines", ())),
         ]  # fmt: skip
         return "\n".join([*lines, "", f"results: {document['folder']}"])

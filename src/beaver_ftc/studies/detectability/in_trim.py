@@ -1,6 +1,7 @@
 """Limits of one frame, SETTLED_S into a healthy flight: surfaces with similar effects on the rates, and
 failures of engines."""
 
+from collections.abc import Sequence
 from itertools import combinations
 from math import degrees
 
@@ -87,4 +88,29 @@ def engine_failures(scenario: Scenario) -> list[Document]:
             "held": has_engine_signal and mapped is not None and mapped.knows_engines,
         }
         for name, acceleration in zip(aircraft.effectors, turns, strict=True)
+    ]
+
+
+def alike_in_words(pairs: Sequence[Document]) -> list[str]:
+    """A sentence for each pair of surfaces that `alike` returns."""
+    lines = []
+    for pair in pairs:
+        limits_deg = {name: x for name, x in pair["told_apart_from_deg"].items() if x is not None}
+        conditions = " or ".join(
+            f"{name} is at least {x:.2g} deg off its command" for name, x in limits_deg.items()
+        )
+        never = "never distinguish them" + (", accelerometers do" if pair["by_forces"] else "")
+        verb = f"distinguish them if {conditions}" if conditions else never
+        lines.append(f"{' and '.join(pair['surfaces'])} have similar effects on the rates: the rates {verb}")
+    return lines
+
+
+def failures_in_words(failures: Sequence[Document]) -> list[str]:
+    """A sentence for each engine of `engine_failures`."""
+    return [
+        f"{row['engine']} failed to idle accelerates the aircraft by {max(row['turns_rad_s2']):.2g} rad/s2, "
+        f"{row['shows']:.2g} times the detection limit of one frame"
+        + ("; the design model knows its moment" if row["known"] else "")
+        + (" and monitors it against the thrust" if row["held"] else "")
+        for row in failures
     ]

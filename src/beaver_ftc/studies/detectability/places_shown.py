@@ -109,33 +109,9 @@ def answer(scenario: Scenario, row: Document) -> str:
 
 
 def upwards(magnitude: float) -> str:
-    """A magnitude in per cent, rounded up, so that the guarantee holds for the printed number."""
+    """A magnitude in per cent, rounded up, so that a sentence guarantees no more than was found. Tables round
+    to the nearest."""
     return f"{ceil(100.0 * magnitude - 1e-9)} %"
-
-
-def geometry(pairs: Rows) -> list[str]:
-    """A sentence for each pair of surfaces that `in_trim.alike` returns."""
-    lines = []
-    for pair in pairs:
-        limits_deg = {name: x for name, x in pair["told_apart_from_deg"].items() if x is not None}
-        conditions = " or ".join(
-            f"{name} is at least {x:.2g} deg off its command" for name, x in limits_deg.items()
-        )
-        never = "never distinguish them" + (", accelerometers do" if pair["by_forces"] else "")
-        verb = f"distinguish them if {conditions}" if conditions else never
-        lines.append(f"{' and '.join(pair['surfaces'])} have similar effects on the rates: the rates {verb}")
-    return lines
-
-
-def of_engines(failures: Rows) -> list[str]:
-    """A sentence for each engine of `in_trim.engine_failures`."""
-    return [
-        f"{row['engine']} failed to idle accelerates the aircraft by {max(row['turns_rad_s2']):.2g} rad/s2, "
-        f"{row['shows']:.2g} times the detection limit of one frame"
-        + ("; the design model knows its moment" if row["known"] else "")
-        + (" and monitors it against the thrust" if row["held"] else "")
-        for row in failures
-    ]
 
 
 def draw_pairs(document: Document) -> "Figure":

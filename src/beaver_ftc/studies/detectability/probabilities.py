@@ -20,6 +20,20 @@ from beaver_ftc.studies.engine.statistics import binomial, duel, or_never, poiss
 from beaver_ftc.studies.present.page import Summary
 from beaver_ftc.studies.present.tables import finite, grouped
 
+Row = Document
+Rows = Sequence[Row]
+COLUMNS = (
+    "sensors", "turbulence", "excitation_deg_s", "seed", "surface", "magnitude", "scheme", "false_alarm",
+    "delay_s", "own_false_alarm", "own_delay_s", *(f"deflection_{s:g}" for s in WITHIN_S),
+)  # fmt: skip
+PLACE = ("sensors", "turbulence", "surface")
+CELL = (*PLACE, "excitation_deg_s", "magnitude", "scheme")
+Key = tuple[str, str, str]  # sensors, turbulence and scheme
+BySeed = dict[int, int]  # number of faults found, by seed
+SIGNIFICANT = 0.05  # with a smaller p, a scheme counts as better or worse
+JUDGED_S = 1.0  # the delay within which figures and comparisons count what is detected
+DUELS_S = (JUDGED_S, WATCHED_S)
+
 
 def level_for(healthy: Sequence[Trace], per_h: float) -> float:
     """The lowest level with at most `per_h` false alarms per hour. A flight has at most one, when its
@@ -41,22 +55,14 @@ def _counted(traces: Sequence[Trace], level: float) -> Document:
     return {"alarms": alarms, "hours": hours, **dict(zip(names, map(finite, rates), strict=True))}
 
 
-Row = Document
-Rows = Sequence[Row]
-COLUMNS = (
-    "sensors", "turbulence", "excitation_deg_s", "seed", "surface", "magnitude", "scheme", "false_alarm",
-    "delay_s", "own_false_alarm", "own_delay_s", *(f"deflection_{s:g}" for s in WITHIN_S),
-)  # fmt: skip
-Key = tuple[str, str, str]  # sensors, turbulence and scheme
-
-
-def _by_condition(watched: Iterable[Watched]) -> dict[Key, list[Trace]]:
-    """The first trace of each block and scheme. All flights of a block are the same before the fault."""
-    traces: dict[Key, list[Trace]] = {}
-    for block in watched:
-        for scheme, traces_of_scheme in block.traces.items():
-            traces.setdefault((*block.block.condition, scheme), []).append(traces_of_scheme[0])
-    return traces
+def _first_traces(watched: Iterable[Watched]) -> dict[Key, list[Trace]]:
+    """The first trace of each block and scheme, by condition. All flights of a block are the same before the
+    fault."""
+    first: dict[Key, list[Trace]] = {}
+    for outcome in watched:
+        for scheme, traces in outcome.traces.items():
+            first.setdefault((*outcome.block.condition, scheme), []).append(traces[0])
+    return first
 
 
 def rows_of(faulted: Iterable[Watched], levels: dict[Key, float]) -> list[Row]:
@@ -117,17 +123,10 @@ def informed_shares(rows: Rows, per_h: float) -> Document:
     }
 
 
-PLACE = ("sensors", "turbulence", "surface")
-CELL = (*PLACE, "excitation_deg_s", "magnitude", "scheme")
-SIGNIFICANT = 0.05  # with a smaller p, a scheme counts as better or worse
-JUDGED_S = 1.0  # the delay within which figures show the share detected
-DUELS_S = (JUDGED_S, WATCHED_S)
-
-
 def document_of(grid: Grid, healthy: Sequence[Watched], faulted: Sequence[Watched]) -> Summary:
     """The document, with the rows of `rows_of` behind it. Raises BadInput if no healthy flight could be
     judged."""
-    watched, faulted_traces = _by_condition(healthy), _by_condition(faulted)
+    watched, faulted_traces = _first_traces(healthy), _first_traces(faulted)
     failures = sorted({failure for outcome in (*healthy, *faulted) for failure in outcome.failures})
     if failures and not watched:
         raise BadInput(f"detectability: no flight could be judged: {failures[0]}")
@@ -193,14 +192,10 @@ def _comparison(rows: Rows) -> list[Document]:
             by_seed_of = {scheme: _found_by_seed(group, within_s) for (scheme,), group in by_scheme}
             others = [scheme for scheme in by_seed_of if scheme not in BUILT_IN]
             for ours, scheme in product([scheme for scheme in BUILT_IN if scheme in by_seed_of], others):
-                duel = {**dict(zip(PLACE, place, strict=True)), "ours": ours, "against": scheme}
-                duel["within_s"] = within_s
-                compared.append(duel | _duel(by_seed_of[ours], by_seed_of[scheme]))
+                line = {**dict(zip(PLACE, place, strict=True)), "ours": ours, "against": scheme}
+                line["within_s"] = within_s
+                compared.append(line | _duel(by_seed_of[ours], by_seed_of[scheme]))
     return compared
-
-
-BySeed = dict[int, int]
-"""Number of faults found, by seed."""
 
 
 def _found_by_seed(rows: Rows, within_s: float) -> BySeed:

@@ -30,7 +30,7 @@ class Forks:
     """
 
     def __init__(self, wanted: bool = True) -> None:
-        self._at_once = cores() if wanted and can_fork() else 0
+        self._at_once = cores() if wanted and can_fork() else 0  # 0: this process does all pieces
         self._results: list[Any] = []
         self._busy: dict[Connection, tuple[int, BaseProcess]] = {}
 
@@ -44,7 +44,7 @@ class Forks:
 
     def submit(self, piece: Piece, then_here: Callable[[], None] = lambda: None) -> None:
         """Do a piece, in a process that is forked now or in this one. Raises the exception of an earlier
-        piece.
+        piece, or of this one if this process does it.
 
         then_here: called in this process if another one does the piece. It makes those changes of the piece
         with which later pieces begin.

@@ -1,5 +1,4 @@
-"""The columns of the table of a sweep with the results of a flight: paths of its metrics, and derived
-columns.
+"""The columns with results in the table of a sweep: paths of the metrics of a flight, and derived columns.
 
 The type of a path follows from the records of the metrics.
 """

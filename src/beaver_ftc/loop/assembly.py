@@ -22,7 +22,7 @@ from beaver_ftc.control.autopilot_setup import AUTOPILOT, set_up_autopilot
 from beaver_ftc.control.profile import COLUMNS
 from beaver_ftc.design.model import anchor
 from beaver_ftc.diagnosis import model_prediction, schemes
-from beaver_ftc.diagnosis.conclusion import assessment_dtype
+from beaver_ftc.diagnosis.assessment import assessment_dtype
 from beaver_ftc.diagnosis.detection.parity import USUAL_SIZE, StatisticalSize
 from beaver_ftc.diagnosis.detection.parity_design import required_size
 from beaver_ftc.diagnosis.detection.statistical_design import configure_statistics

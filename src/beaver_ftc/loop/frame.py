@@ -19,12 +19,7 @@ from beaver_ftc.control import accommodation, allocation, power, state
 from beaver_ftc.control.autopilot import steer
 from beaver_ftc.control.laws import reference
 from beaver_ftc.control.profile import record_deviations
-from beaver_ftc.diagnosis import conclusion, schemes
-from beaver_ftc.diagnosis.conclusion import (
-    assess_surfaces,
-    assess_unknown,
-    hold_assessment,
-)
+from beaver_ftc.diagnosis import assessment, conclusion, schemes
 from beaver_ftc.diagnosis.detection import fdae
 from beaver_ftc.diagnosis.model_prediction import (
     add_instant,
@@ -167,13 +162,13 @@ def diagnose(frame):
 @kernel
 def assess_faults(frame):
     """Put what the diagnosis says of each surface, and of what is unknown, where the law reads it."""
-    fdi, assessment = frame.fdi, frame.assessment
+    fdi, out = frame.fdi, frame.assessment
     config, found, types, layout, detector = fdi.config, fdi.verdict, fdi.types, fdi.layout, fdi.statistical
     if found.detected and sensor_monitor.has_alarm(fdi.sensor_monitor):
-        hold_assessment(assessment, types)
+        assessment.hold_assessment(out, types)
     else:
-        assess_surfaces(assessment, config, found, types, layout, fdi.isolation.estimator, detector)
-    assess_unknown(assessment, config, found, types, layout, detector, fdi.fdae, fdi.bound)
+        assessment.assess_surfaces(out, config, found, types, layout, fdi.isolation.estimator, detector)
+    assessment.assess_unknown(out, config, found, types, layout, detector, fdi.fdae, fdi.bound)
 
 
 @apart
@@ -199,8 +194,8 @@ def sense_inside(frame):
 
 @kernel
 def isolated_theta(fdi, s):
-    """Estimated theta of the isolated loss of surface s: see conclusion.py."""
-    return conclusion.isolated_theta(
+    """Estimated theta of the isolated loss of surface s: see assessment.py."""
+    return assessment.isolated_theta(
         fdi.config, fdi.verdict, fdi.layout, fdi.isolation.estimator, fdi.statistical, s
     )[0]
 

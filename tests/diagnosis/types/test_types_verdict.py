@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from kernels import new_fdi, on, put_on
 
-from beaver_ftc.diagnosis import conclusion
+from beaver_ftc.diagnosis import assessment
 from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
 from beaver_ftc.diagnosis.types import (
     GIVE_UP,
@@ -176,10 +176,10 @@ def test_what_is_done_about_a_surface(kinds, accommodation_mode):
 
 def test_without_a_sensor_offsets_stay_that_stay_by_themselves():
     surfaces = new_case(aileron=(STUCK,), elevator=(BIAS,), rudder=(OSCILLATORY,), flap=(SLOW,))["types"]
-    out = np.zeros(1, conclusion.assessment_dtype(4)).view(np.recarray)[0]
+    out = np.zeros(1, assessment.assessment_dtype(4)).view(np.recarray)[0]
     out["accommodation_mode"] = GIVE_UP, SUBTRACT_OFFSET, SUBTRACT_OFFSET, WAIT_FOR_SURFACE
     out["offset"] = out["lag"] = 0.1
-    conclusion.hold_assessment(out, surfaces)
+    assessment.hold_assessment(out, surfaces)
     assert (out["offset"].tolist(), out["lag"].any()) == ([0.1, 0.1, 0.0, 0.0], False)
 
 

@@ -5,13 +5,12 @@ import pytest
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.design.model import DesignFunctions, design_of, inertia_coefficients, inertial
-from beaver_ftc.diagnosis.informed_test import term_acceleration
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.log import Columns
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.matrix.fault_matrix import FaultCase, informed_counts, scenario_of, trimmed_deg
-from beaver_ftc.studies.matrix.informed import columns_of, informed_row
+from beaver_ftc.studies.matrix.informed import columns_of, informed_row, term_acceleration
 from telling import apart
 
 AIRCRAFT = load()

@@ -16,6 +16,7 @@ import numpy as np
 from beaver_ftc.compiled import apart, fill, kernel, record, sized
 from beaver_ftc.diagnosis import bounds, isolation, state
 from beaver_ftc.diagnosis import conclusion as conclusions
+from beaver_ftc.diagnosis.assessment import weighs_statistics
 from beaver_ftc.diagnosis.bounds import bound_dtype
 from beaver_ftc.diagnosis.conclusion import (
     PLUGIN_DECIDES,
@@ -148,7 +149,7 @@ def detection_share(fdi):
     """
     stat, authority = fdi.statistical, fdi.config.authority
     share = 0.0 if authority == STATISTICAL_DETECTOR else bank_share(fdi.bank)
-    if not conclusions.weighs_statistics(stat, authority):
+    if not weighs_statistics(stat, authority):
         return share
     return max(stat.alarm.ratio, share) if share > 1.0 else stat.alarm.ratio
 

@@ -5,18 +5,21 @@ surface in the truth less that of a healthy surface with the same commands. Coef
 constants, evenly distributed over their tolerance.
 """
 
-from math import sqrt
-from typing import TYPE_CHECKING
+from math import prod, sqrt
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from beaver_ftc.aircraft import Aircraft
+from beaver_ftc.aircraft import AXES, Aircraft, Term
+from beaver_ftc.aircraft.aircraft import MOMENTS
+from beaver_ftc.compiled import plain
+from beaver_ftc.design.actuators import nearer
 from beaver_ftc.design.context import Context
+from beaver_ftc.design.model import accelerate, design_record
+from beaver_ftc.design.table import N_SIGNALS, signals
 from beaver_ftc.diagnosis.informed_test import (
     WhiteningFilter,
     detection_probability,
-    healthy_positions,
-    term_acceleration,
     with_measured_gust,
 )
 from beaver_ftc.results.log import Columns
@@ -83,3 +86,48 @@ def _declared(scenario: "Scenario") -> tuple[Context, np.ndarray]:
         context = with_measured_gust(context, np.sqrt(diagnosis.acceleration_variance_from_input_noise))
     loop.release()
     return context, coefficients
+
+
+def healthy_positions(context: Context, columns: Columns, surface: str) -> np.ndarray:
+    """Positions of a healthy surface, without a dead band, under the commands of a flight, (frames,) rad:
+
+        u <- u + clip(a (command - u), -step, step)      a = 1 - exp(-bandwidth h)      step = rate h
+
+    in each JSBSim frame of h s, with the command limited to the travel, from the first position of the log
+    on. A bandwidth of 0 stands for no lag, a rate limit of 0 for none. A position is that at the end of its
+    frame.
+    """
+    s = context.surfaces.index(surface)
+    commands = columns[f"{surface}_cmd_rad"]
+    bandwidth = context.declared.bandwidth_rad_s[s]
+    rate = context.declared.rate_limit_rad_s[s]
+    h = context.dt_s / context.substeps
+    a = 1.0 - np.exp(-bandwidth * h) if bandwidth else 1.0
+    step = rate * h if rate else np.inf
+    u = columns[f"{surface}_effective_rad"][0]
+    positions = np.empty_like(commands)
+    for k, command in enumerate(np.clip(commands, *context.travel_rad[:, s])):
+        for _ in range(context.substeps):
+            u = plain(nearer)(u, command, a, step)
+        positions[k] = u
+    return positions
+
+
+def term_acceleration(
+    aircraft: Aircraft, term: Term, columns: Columns, deflection: np.ndarray | None
+) -> np.ndarray:
+    """Acceleration by a term whose coefficient is one, (frames, 3) rad/s2, along a flight: the product of its
+    factors, scaled to a moment and divided by the inertia. deflection (frames,) rad: of its surface, if
+    any."""
+    x = np.array([columns[f"{axis}_rad_s"] for axis in AXES])
+    names = "alpha_rad", "beta_rad", "airspeed_mps", "qdyn_pa", *aircraft.signals
+    y = np.array([columns[name] for name in names])
+    design = design_record(aircraft).view(np.recarray)[0]
+    signal = np.empty((N_SIGNALS, y.shape[1]))
+    C = np.zeros((3, 1, y.shape[1]))
+    plain(signals)(design.moments, x, y, signal)
+    values: dict[str | None, Any] = dict(zip(aircraft.signal_names, signal, strict=False))
+    values[term.surface] = deflection
+    C[MOMENTS.index(term.coefficient), 0] = prod(values[factor] for factor in term.factors)
+    plain(accelerate)(design, y, C)
+    return C[:, 0].T

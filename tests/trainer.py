@@ -7,7 +7,7 @@ import yaml
 from beaver_ftc.aircraft.aircraft import Aircraft
 from beaver_ftc.aircraft.schema import AircraftFile
 
-FOLDER = Path(__file__).parent / "data" / "aircraft" / "trainer"
+TRAINER = Path(__file__).parent / "data" / "aircraft" / "trainer"
 
 
 def trainer_file(**sections):
@@ -15,7 +15,7 @@ def trainer_file(**sections):
 
     A surface need not say its properties, and is in a group of its own unless groups are said.
     """
-    data = yaml.safe_load((FOLDER / "aircraft.yaml").read_text(encoding="utf-8"))
+    data = yaml.safe_load((TRAINER / "aircraft.yaml").read_text(encoding="utf-8"))
     for section, given in sections.items():
         mapping = isinstance(given, dict)
         data[section] = {**data.get(section, {}), **given} if mapping else given
@@ -31,4 +31,11 @@ def trainer_file(**sections):
 
 def trainer(**sections):
     """The aircraft."""
-    return Aircraft(AircraftFile.model_validate(trainer_file(**sections)), FOLDER)
+    return Aircraft(AircraftFile.model_validate(trainer_file(**sections)), TRAINER)
+
+
+def change(file, old, new):
+    """Write other words into a copy of the file."""
+    text = file.read_text()
+    assert old in text
+    file.write_text(text.replace(old, new))

@@ -63,8 +63,8 @@ def add_ranges_and_threshold(parts: Parts, model: Model) -> Model:
 def _gain_sd(parts: Parts, model: Model, folds: Sequence[Fold]) -> Floats:
     """Standard error of the gain of each group, sd (G,), of a gain that is 1 in the model:
 
-        sd = min(sqrt(s^2), GAIN_SD_CAP)                        without other laws
-        sd = min(sqrt(s^2 + mean over k of d_k^2), ...)         with other laws, k = 0 to K
+        sd = min(sqrt(s^2 + d^2), GAIN_SD_CAP)
+        d^2 = mean over k = 0 to K of d_k^2, 0 without other laws
 
     s: standard error of the fit. d_1 to d_K: deviations of the gain from 1 in each of several flights left
     out. d_0: the largest error by which the fit may misread the gain, sqrt(3) times its standard deviation

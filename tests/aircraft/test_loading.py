@@ -7,7 +7,7 @@ import pytest
 from beaver_ftc.aircraft import aircraft, load
 from beaver_ftc.aircraft.aircraft import UnknownAircraft, read
 from beaver_ftc.documents.errors import BadInput
-from trainer import FOLDER
+from trainer import TRAINER
 
 
 @pytest.fixture
@@ -15,7 +15,7 @@ def beside(tmp_path, monkeypatch):
     """A scenario's folder with an aircraft below it; nothing was looked for yet."""
     monkeypatch.setattr(aircraft, "_SEEN", {})
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    shutil.copytree(FOLDER, tmp_path / "here" / "trainer")
+    shutil.copytree(TRAINER, tmp_path / "here" / "trainer")
     return tmp_path / "here"
 
 
@@ -65,7 +65,7 @@ def test_links_stay_below_the_scenario_s_folder(beside):
     ],
 )
 def test_a_model_stands_beside_its_file(beside, model, says):
-    (beside / "trainer" / "link.xml").symlink_to(FOLDER / "trainer.xml")
+    (beside / "trainer" / "link.xml").symlink_to(TRAINER / "trainer.xml")
     file = beside / "trainer" / "aircraft.yaml"
     file.write_text(file.read_text().replace("trainer.xml", model))
     with pytest.raises(BadInput, match=says):

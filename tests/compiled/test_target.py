@@ -7,7 +7,17 @@ import os
 import subprocess
 import sys
 
+import numba
+import pytest
+
 from beaver_ftc import compiled
+
+
+@pytest.mark.parametrize("version", ["0.67.2", "0.680.0", "1.0.0"])
+def test_of_another_version_nothing_is_borrowed(monkeypatch, version):
+    monkeypatch.setattr(numba, "__version__", version)
+    assert compiled._own_target.__wrapped__() is None
+
 
 KERNELS = """
 import sys

@@ -2,7 +2,6 @@
 
 import os
 import shutil
-from pathlib import Path
 
 import pytest
 
@@ -11,8 +10,7 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.documents.validation import ScenarioError
 from beaver_ftc.plant import admission
 from beaver_ftc.scenario import airframe
-
-TRAINER = Path(__file__).parents[1] / "data" / "aircraft" / "trainer"
+from trainer import TRAINER, change
 
 
 @pytest.fixture
@@ -22,12 +20,6 @@ def trainer(tmp_path, monkeypatch):
     monkeypatch.setattr(airframe, "offered", lambda service: None)
     shutil.copytree(TRAINER, tmp_path / "trainer")
     return tmp_path / "trainer"
-
-
-def change(file, old, new):
-    text = file.read_text()
-    assert old in text
-    file.write_text(text.replace(old, new))
 
 
 @pytest.mark.parametrize(

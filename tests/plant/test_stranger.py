@@ -18,8 +18,8 @@ from beaver_ftc.cli.main import app
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.plant.adapter import bare
 from beaver_ftc.plant.instrumented import instrument, source_of
+from trainer import TRAINER
 
-TRAINER = Path(__file__).parents[1] / "data" / "aircraft" / "trainer"
 SCENARIO = "name: stranger\naircraft: ./trainer\nduration_s: 0.5\n"
 
 

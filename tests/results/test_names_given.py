@@ -5,7 +5,7 @@ import pytest
 import beaver_ftc as bf
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.scenario.schema import Scenario as Given
-from trainer import FOLDER
+from trainer import TRAINER
 
 LOSS = {"actuator": "elevator", "type": "loss_of_effectiveness", "magnitude": 0.5, "at_s": 4}
 JAM = {"actuator": "rudder", "type": "stuck", "position_deg": 8, "at_s": 9}
@@ -31,7 +31,7 @@ NOISY = {"bounds": {"sensors": "tactical-grade"}}
 )
 def test_what_a_hint_proposes_can_be_flown(keys):
     given = {"name": "x", "duration_s": 10, "faults": [LOSS, JAM], **keys}
-    scenario = Given.model_validate(given, context={"folder": FOLDER.parent})
+    scenario = Given.model_validate(given, context={"folder": TRAINER.parent})
     flight = bf.fly(scenario.with_({"duration_s": 9.5}))
     (hint,) = [said for said in flight.metrics["hints"] if "several surfaces" in said]
     proposed = scenario.with_({"fdi.fault_class": "all"}) if scenario.fdi.is_ours else scenario

@@ -5,6 +5,7 @@ import sys
 import pytest
 
 from beaver_ftc.documents.errors import SimulationFailed
+from beaver_ftc.results import result_files
 from beaver_ftc.results.folder import result_folder
 
 KILLED = """
@@ -67,3 +68,15 @@ def test_folder_with_something_else_in_it_is_not_touched(tmp_path):
         pytest.fail("refuse before flying, not after")
     assert _names(tmp_path) == ["case"]
     assert _names(tmp_path / "case") == [".git"]
+
+
+def test_a_report_that_cannot_be_drawn_takes_nothing_out_of_a_folder(tmp_path, monkeypatch):
+    """What is new in it may be a newer flight's."""
+
+    def draw(folder, document, to):
+        (folder / "newer").touch()
+        raise OSError("full")
+
+    monkeypatch.setattr(result_files, "write_report_files", draw)
+    assert "full" in result_files.add_report(tmp_path, {})
+    assert [path.name for path in tmp_path.iterdir()] == ["newer"]

@@ -1,7 +1,6 @@
 """Mistakes in a folder of one's own aircraft."""
 
 import shutil
-from pathlib import Path
 
 import pytest
 
@@ -11,8 +10,7 @@ from beaver_ftc.aircraft.aircraft import read
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.scenario.airframe import find_aircraft
 from beaver_ftc.scenario.schema import Scenario, load
-
-TRAINER = Path(__file__).parents[1] / "data" / "aircraft" / "trainer"
+from trainer import TRAINER
 
 
 def test_an_aircraft_without_its_model_is_bad_input(tmp_path):

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from tools.drawn.campaign import fly
 from tools.drawn.compose import EVERYTHING, array_of, drawn_flights
+from tools.drawn.promises import broken
 
+import beaver_ftc as bf
 from beaver_ftc.scenario.schema import json_schema
 
 AIRCRAFT = ("beaver", "jsbsim:c172p")
@@ -41,6 +43,32 @@ def paths(words, path=""):
         yield here
         if isinstance(value, dict):
             yield from paths(value, here)
+
+
+@pytest.fixture(scope="module")
+def published():
+    return bf.fly(bf.load("elevator-partial-loss").with_({"duration_s": 14.0}))
+
+
+def altered(metrics, **sections):
+    return {**metrics, **{name: {**metrics[name], **keys} for name, keys in sections.items()}}
+
+
+@pytest.mark.parametrize(
+    ("sections", "kind"),
+    [
+        ({"detection": {"time_s": 3.0}}, "false alarm"),
+        ({"detection": {"guaranteed_delay_s": 0.001, "delay_s": 0.5}}, "late"),
+        ({"detection": {"detected": False, "time_s": None, "delay_s": None}}, "isolation"),
+        ({"isolation": {"fault": "rudder"}}, "wrong name"),
+        ({"isolation": {"fault": "unanticipated"}}, "excluded"),
+        ({"isolation": {"fault": None, "isolated": False, "candidates": ["rudder"]}}, "excluded"),
+    ],
+)
+def test_a_broken_promise_is_seen(published, sections, kind):
+    assert list(broken(published.scenario, published.metrics, True)) == []
+    found = broken(published.scenario, altered(published.metrics, **sections), True)
+    assert kind in {line.partition(":")[0] for line in found}
 
 
 @pytest.mark.parametrize("every", [1, 10])

@@ -7,7 +7,7 @@ It is the output of the diagnosis (`out`), and only this file writes it.
     conclusion    record of `conclusion_dtype`
     types         record of `fault_types_dtype`; surf: that of one surface
     fies          isolation estimators; layout: their numbers, by surface
-    s, t          surface; time, s
+    s             surface
 """
 
 import numpy as np

@@ -9,7 +9,8 @@ this file, which alone writes the conclusion:
     the fault types   a surface with its type
     a monitor         that the cause is no surface
 
-What the laws read of each surface: assessment.py.
+What the laws read of each surface: assessment.py. Symbols: fies, j: isolation estimators, and the number of
+one; s: surface; t: time, s.
 """
 
 import numpy as np

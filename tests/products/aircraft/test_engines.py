@@ -17,9 +17,8 @@ from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.instrumented import source_of
 from beaver_ftc.plant.trim import trim
 from beaver_ftc.scenario.declared import Declared
-from beaver_ftc_aircraft.derive import derivation
-from beaver_ftc_aircraft.derive import sample as sampling
 from beaver_ftc_aircraft.derive.derivation import derive
+from products.aircraft.derive.foreign import quickly
 
 M_PER_IN, N_PER_LBF = 0.0254, 4.4482216
 DT, YAW = 0.01, 2
@@ -29,12 +28,7 @@ DT, YAW = 0.01, 2
 def jet(tmp_path_factory):
     """The 737 with its engines as effectors, in a folder beside a scenario."""
     folder = tmp_path_factory.mktemp("engines")
-    with pytest.MonkeyPatch.context() as quick:
-        quick.setattr(sampling, "STARTS_OF_WORST", 8)
-        quick.setattr(sampling, "FRAMES", 200)
-        quick.setattr(sampling, "STARTS", 16)
-        quick.setattr(derivation, "SAMPLES", 1000)
-        quick.setattr(derivation, "CHECKED", 400)
+    with quickly(1000, 400):
         derive("jsbsim:737", folder / "aircraft", engines=True)
     return folder
 

@@ -1,7 +1,6 @@
 """The fault mismatch function against brute force, and its promises against flights."""
 
 import shutil
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -30,9 +29,9 @@ from beaver_ftc.studies.detectability.places_shown import answer
 from beaver_ftc.studies.engine.study import run_study
 from flying import loss, scenario
 from samples import samples
+from trainer import TRAINER
 
 FAULTS = ("aileron", "elevator", "rudder")
-TRAINER = Path(__file__).parents[2] / "data" / "aircraft" / "trainer"
 FLIGHT = """
 name: elsewhere
 aircraft: ./NAME

@@ -1,7 +1,12 @@
 """Models as other authors write them: the Navion of the examples, changed."""
 
 import re
+from contextlib import contextmanager
 from pathlib import Path
+
+import pytest
+
+from beaver_ftc_aircraft.derive import derivation, sample
 
 NAVION = (Path(__file__).parents[4] / "examples" / "own-aircraft" / "navion.xml").read_text()
 ENGINE = """<propulsion> <engine file="{engine}"> <feed> 0 </feed> <thruster file="{thruster}">
@@ -90,3 +95,15 @@ def write(folder, text, name="navion"):
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(re.sub(r'<fdm_config name="\w+"', f'<fdm_config name="{name}"', text))
     return path
+
+
+@contextmanager
+def quickly(samples, checked):
+    """From few states and short flights, where it does not matter how large the errors are."""
+    with pytest.MonkeyPatch.context() as patched:
+        for module, name, value in (
+            (sample, "STARTS_OF_WORST", 8), (sample, "FRAMES", 200), (sample, "STARTS", 16),
+            (derivation, "SAMPLES", samples), (derivation, "CHECKED", checked),
+        ):  # fmt: skip
+            patched.setattr(module, name, value)
+        yield

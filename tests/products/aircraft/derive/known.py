@@ -1,13 +1,10 @@
 """An aircraft whose terms are known, and states whose accelerations follow from them by Euler's equations."""
 
-from pathlib import Path
-
 import yaml
 
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.aircraft.schema import AircraftFile
-
-TRAINER = Path(__file__).parents[3] / "data" / "aircraft" / "trainer"
+from trainer import TRAINER
 
 
 def aircraft(*signals, **more):

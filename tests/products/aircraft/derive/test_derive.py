@@ -3,7 +3,6 @@
 import hashlib
 import shutil
 import tempfile
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -26,7 +25,6 @@ from beaver_ftc.plant.trim import trim as trim_plant
 from beaver_ftc.scenario.airframe import find_aircraft
 from beaver_ftc.scenario.schema import load_text
 from beaver_ftc_aircraft.derive import derivation, first_use
-from beaver_ftc_aircraft.derive import sample as sampling
 from beaver_ftc_aircraft.derive.derivation import derive, source_of, try_out
 from beaver_ftc_aircraft.derive.fit import errors_of
 from beaver_ftc_aircraft.derive.outline import not_affine, usual_start
@@ -34,8 +32,10 @@ from beaver_ftc_aircraft.derive.sample import SIDESLIP_RAD, Envelope, sample
 from beaver_ftc_links.sitl.ardupilot import Ardupilot
 from beaver_ftc_links.sitl.link import Link
 from beaver_ftc_links.sitl.vehicle import Vehicle
+from trainer import TRAINER
 
-TRAINER = Path(__file__).parents[3] / "data" / "aircraft" / "trainer"
+from .foreign import quickly
+
 FLIGHT = """
 name: derived
 aircraft: ./NAME
@@ -69,21 +69,9 @@ def unseen(derived):
     return sample(Plant(100, aircraft=aircraft), envelope, made.trim, 1000, 77, properties, (0,)), aircraft
 
 
-@contextmanager
-def quickly():
-    """Where it does not matter how large the errors are."""
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(sampling, "STARTS_OF_WORST", 8)
-        patched.setattr(sampling, "FRAMES", 200)
-        patched.setattr(sampling, "STARTS", 16)
-        patched.setattr(derivation, "SAMPLES", 1500)
-        patched.setattr(derivation, "CHECKED", 500)
-        yield
-
-
 @pytest.fixture
 def quick():
-    with quickly():
+    with quickly(1500, 500):
         yield
 
 
@@ -91,7 +79,7 @@ def quick():
 def again(tmp_path_factory):
     """The built-in aircraft derived from its model, in a folder."""
     folder = tmp_path_factory.mktemp("again")
-    with quickly():
+    with quickly(1500, 500):
         return derive("beaver", folder), folder
 
 

@@ -4,7 +4,6 @@ That what it finds is right other tests say, from many states and known coeffici
 """
 
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 import yaml
@@ -14,8 +13,8 @@ from beaver_ftc.plant.trim import trim
 from beaver_ftc.scenario.airframe import find_aircraft
 from beaver_ftc_aircraft.derive import derivation, derived, sample
 from beaver_ftc_aircraft.derive.outline import usual_start
+from trainer import TRAINER
 
-TRAINER = Path(__file__).parents[3] / "data" / "aircraft" / "trainer"
 ENVELOPE = "airspeed_mps: [42, 58]\nalpha_deg: [-2, 9]\naltitude_m: 1200\nsideslip_deg: 6\n"
 
 

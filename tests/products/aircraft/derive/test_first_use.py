@@ -1,15 +1,13 @@
 """An aircraft's own file against its JSBSim model: said where they differ, kept until a file changes."""
 
 import shutil
-from pathlib import Path
 
 import pytest
 
 from beaver_ftc.aircraft.aircraft import read
 from beaver_ftc.scenario.airframe import find_aircraft
 from beaver_ftc_aircraft.derive import first_use
-
-TRAINER = Path(__file__).parents[3] / "data" / "aircraft" / "trainer"
+from trainer import TRAINER, change
 
 
 @pytest.fixture
@@ -18,12 +16,6 @@ def trainer(tmp_path, monkeypatch):
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
     shutil.copytree(TRAINER, tmp_path / "trainer")
     return tmp_path / "trainer"
-
-
-def change(file, old, new):
-    text = file.read_text()
-    assert old in text
-    file.write_text(text.replace(old, new))
 
 
 def test_a_file_that_says_what_the_model_does_is_said_nothing_of(trainer):

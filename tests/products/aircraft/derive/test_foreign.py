@@ -10,7 +10,7 @@ from beaver_ftc.plant.adapter import bare
 from beaver_ftc.plant.instrumented import instrument
 from beaver_ftc.plant.model_file import copy_of
 from beaver_ftc.scenario.schema import load_text
-from beaver_ftc_aircraft.derive import derivation, sample
+from beaver_ftc_aircraft.derive import derivation
 from beaver_ftc_aircraft.derive.derivation import source_of
 
 from . import foreign
@@ -151,12 +151,7 @@ def wing(tmp_path_factory):
     """An aircraft without a rudder, derived from few states."""
     folder = tmp_path_factory.mktemp("wing")
     path = foreign.write(folder, foreign.powered(text=foreign.wing()), "wing")
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(derivation, "SAMPLES", 300)
-        patched.setattr(derivation, "CHECKED", 400)
-        patched.setattr(sample, "STARTS_OF_WORST", 8)
-        patched.setattr(sample, "FRAMES", 200)
-        patched.setattr(sample, "STARTS", 16)
+    with foreign.quickly(300, 400):
         return derivation.derive(str(path), folder / "out"), folder / "out"
 
 

@@ -17,7 +17,7 @@ import scipy.stats
 
 from tools.mutants.making import Mutant
 from tools.mutants.reach import Reach, few_examples, reach
-from tools.mutants.scope import FLOWN, GLUE, MODES, SOURCES, drawn, flown, left_out, stale
+from tools.mutants.scope import FLOWN, MODES, SOURCES, drawn, flown, left_out, stale
 from tools.mutants.trial import HANGS, KILLED, outcome
 
 LEAST = 85.0  # per cent
@@ -35,7 +35,7 @@ def main() -> int:
     _say(f"mutants that can be made: {made}; none of")
     for line in left_out():
         _say(f"  {line}")
-    ends = _trials(taken, _tests(options.jobs), options)
+    ends = _trials(taken, _tests({kind for kind, _ in taken}, options.jobs), options)
     for kind in numbers:
         of = {end: number for (its, end), number in sorted(ends.items()) if its == kind}
         _say(f"{kind}: {', '.join(f'{number} {end.lower()}' for end, number in of.items()) or 'none drawn'}")
@@ -57,9 +57,10 @@ def _say(text: str) -> None:
     print(text, flush=True)
 
 
-def _tests(jobs: int) -> dict[str, Reach]:
-    """What the tests of each mode execute."""
-    found = {mode: reach(mode, jobs, _say) for mode in MODES[GLUE]}
+def _tests(kinds: set[str], jobs: int) -> dict[str, Reach]:
+    """What the tests of each mode execute that mutants of these kinds need."""
+    modes = dict.fromkeys(mode for kind in kinds for mode in MODES[kind] if mode != FLOWN)
+    found = {mode: reach(mode, jobs, _say) for mode in modes}
     for mode, tests in found.items():
         reasons = ", ".join(f"{number} {why}" for why, number in tests.left_out.items())
         _say(f"{mode}: {len(tests.seconds)} tests take part; left out: {reasons or 'none'}")

@@ -115,8 +115,8 @@ def tests(mode: str) -> list[Path]:
 def flown(file: Path) -> dict[str, float]:
     """The test files that fly a compiled mutant of a module, and their times, s."""
     own = sorted(set((TESTS / folder_of_tests(file)).glob("test_*.py")) - set(tests(PLAIN)))
-    files = [file for pattern in FLIGHTS for file in sorted(TESTS.glob(pattern))]
-    return {path.relative_to(ROOT).as_posix(): FILE_S for path in dict.fromkeys([*own, *files])}
+    flights = [path for pattern in FLIGHTS for path in sorted(TESTS.glob(pattern))]
+    return {path.relative_to(ROOT).as_posix(): FILE_S for path in dict.fromkeys([*own, *flights])}
 
 
 def folder_of_tests(file: Path) -> str:

@@ -13,7 +13,7 @@ from beaver_ftc.design.table import AIRSPEED, fill_table
 from beaver_ftc.diagnosis.detection.forces import VANE_E
 from beaver_ftc.diagnosis.deviations import flow_noise, gust_noise
 from beaver_ftc.diagnosis.gusts import MIN_UNMEASURED_SHARES
-from beaver_ftc.diagnosis.monitors.redundancy import EARTH_M_S2
+from beaver_ftc.diagnosis.monitors.residual_bounds import EARTH_M_S2
 from beaver_ftc.scenario.declared import MASS_TOLERANCE, Declared, SensorErrors
 
 INTEGRATION_NOISE_GAIN = 1.6  # noise gain of the two-step method: sqrt(1.5^2 + 0.5^2), rounded up

@@ -5,7 +5,7 @@ import numpy as np
 from beaver_ftc.aircraft import aircraft
 from beaver_ftc.diagnosis import bounds, error_map
 from beaver_ftc.diagnosis.detection import filters, likelihood, statistical, statistical_design, tones
-from beaver_ftc.diagnosis.monitors import numbering, redundancy
+from beaver_ftc.diagnosis.monitors import numbering, residual_bounds
 from beaver_ftc.plant import instruments
 from beaver_ftc.studies.present.tables import markdown_table
 
@@ -58,25 +58,25 @@ CONSTANTS = (  # (section, meaning, module, name there, unit)
     (
         9,
         "turn rate of the local horizontal",
-        redundancy,
+        residual_bounds,
         "EARTH_TURN_RAD_S",
         "rad/s",
     ),
     (
         9,
         "bound on Coriolis and centrifugal acceleration and gravity",
-        redundancy,
+        residual_bounds,
         "EARTH_M_S2",
         "m/s²",
     ),
     (
         9,
         "climb with a factor e of air density",
-        redundancy,
+        residual_bounds,
         "DENSITY_SCALE_HEIGHT_M",
         "m",
     ),
-    (9, "largest pitch attitude of the attitude tests", redundancy, "MAX_PITCH_RAD", "rad"),
+    (9, "largest pitch attitude of the attitude tests", residual_bounds, "MAX_PITCH_RAD", "rad"),
 )
 
 

@@ -13,7 +13,7 @@ from beaver_ftc.compiled import fill
 from beaver_ftc.design.engine import slipstream_slopes
 from beaver_ftc.design.table import AIRSPEED, DPT, QDYN
 from beaver_ftc.diagnosis.detection.forces import MEASURED_FORCES, NORMAL_INDEX, SIDE_INDEX, terms_of_force
-from beaver_ftc.diagnosis.monitors.redundancy import EARTH_M_S2
+from beaver_ftc.diagnosis.monitors.residual_bounds import EARTH_M_S2
 from beaver_ftc.diagnosis.state import ROLL, SIDE_FORCE
 from beaver_ftc.plant.instruments import NOISE_LIMIT_SIGMA
 from beaver_ftc.scenario.declared import MASS_TOLERANCE, Declared, SensorErrors

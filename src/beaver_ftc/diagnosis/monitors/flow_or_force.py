@@ -24,7 +24,6 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel, record
 from beaver_ftc.diagnosis.detection.filters import leak
-from beaver_ftc.diagnosis.monitors.initial_errors import speed
 from beaver_ftc.diagnosis.monitors.numbering import (
     ALPHA_TEST,
     BETA_TEST,
@@ -37,7 +36,8 @@ from beaver_ftc.diagnosis.monitors.numbering import (
     SPEED_TEST,
     THETA,
 )
-from beaver_ftc.diagnosis.monitors.redundancy import AB_NOW, FORCE_JUMP_M_S2, too_steep
+from beaver_ftc.diagnosis.monitors.redundancy import FORCE_JUMP_M_S2
+from beaver_ftc.diagnosis.monitors.residual_bounds import AB_NOW, speed, too_steep
 from beaver_ftc.plant.instruments import AX, N_SENSORS, PHI
 
 # Number of repeated readings for a sensor that is never called frozen: its sound reading may repeat, because

@@ -55,13 +55,8 @@ from beaver_ftc.diagnosis.monitors.numbering import (
     NO_SENSOR,
     SPEED_TEST,
 )
-from beaver_ftc.diagnosis.monitors.redundancy import (
-    MIN_AIRSPEED_MPS,
-    run_tests,
-    start_tests,
-    store_sample,
-    too_steep,
-)
+from beaver_ftc.diagnosis.monitors.redundancy import run_tests, start_tests, store_sample
+from beaver_ftc.diagnosis.monitors.residual_bounds import MIN_AIRSPEED_MPS, too_steep
 from beaver_ftc.diagnosis.monitors.suspects import find_suspects, latch_exceeded
 from beaver_ftc.plant.instruments import (
     AX,

@@ -34,15 +34,12 @@ from beaver_ftc.diagnosis.monitors.flow_or_force import (
     stands_still,
 )
 from beaver_ftc.diagnosis.monitors.gyro_or_attitude import GYRO_CONFIRMED, GYRO_REFUTED, turn_share
+from beaver_ftc.diagnosis.monitors.initial_effects import H_AIRSPEED, H_PHI, N_INITIAL
 from beaver_ftc.diagnosis.monitors.initial_errors import (
-    H_AIRSPEED,
-    H_PHI,
     INITIAL_SENSOR,
-    N_INITIAL,
     exceeds,
     explains_exceeded,
     latch_refuted,
-    speed,
 )
 from beaver_ftc.diagnosis.monitors.numbering import (
     ALPHA_TEST,
@@ -62,6 +59,7 @@ from beaver_ftc.diagnosis.monitors.numbering import (
     SPEED_TEST,
     THETA,
 )
+from beaver_ftc.diagnosis.monitors.residual_bounds import speed
 from beaver_ftc.diagnosis.monitors.rotation import unit
 from beaver_ftc.plant.instruments import AX, N_SENSORS, PHI
 

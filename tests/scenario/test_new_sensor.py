@@ -39,7 +39,10 @@ ROW = """    Row(
 )
 """
 # An error of another sensor contradicts the altitude, or the flow, but not both.
-EQUATION = '''VERTICAL_TEST = N_EQUATIONS - 1
+EQUATION = '''from beaver_ftc.diagnosis.monitors.numbering import CLIMB_TEST
+from beaver_ftc.diagnosis.monitors.residual_bounds import set_bound
+
+VERTICAL_TEST = N_EQUATIONS - 1
 VERTICAL = SENSOR_OF[VERTICAL_TEST]
 
 
@@ -49,8 +52,7 @@ def judge_vertical_speed(mon, y):
     j, past = VERTICAL_TEST, mon.y_past
     climbed = mon.h * past[VERTICAL]
     mon.residual[j] = y[ALTITUDE] - past[ALTITUDE] - climbed
-    mon.per_s[j] = mon.per_s[CLIMB_TEST] + mon.e_past[VERTICAL]
-    mon.per_sample[j] = mon.per_sample[CLIMB_TEST]
+    set_bound(mon, j, mon.per_s[CLIMB_TEST] + mon.e_past[VERTICAL], mon.per_sample[CLIMB_TEST])
     filter_test(mon, j)
     by_flow = abs(mon.y_pred[ALTITUDE] - past[ALTITUDE] - climbed) / (mon.h * mon.per_s[j])
     mon.ratio[j] = min(mon.ratio[j], by_flow)

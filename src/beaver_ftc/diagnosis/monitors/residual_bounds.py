@@ -25,8 +25,6 @@ from beaver_ftc.diagnosis.monitors.numbering import (
     I_BETA,
     I_QDYN,
     PSI,
-    RPM_TEST,
-    SENSOR_OF,
     SPEED_TEST,
     THETA,
 )
@@ -98,14 +96,18 @@ def too_steep(mon, y):
 
 
 @kernel
+def set_bound(mon, j, per_s, per_sample):
+    """Set the bound on the residual of test j, from the sample before, and by the reading of this sample."""
+    mon.per_s[j], mon.per_sample[j] = per_s, per_sample
+
+
+@kernel
 def bound_residuals(mon, y):
     """Fill per_s, per_sample and gust of each test of the equations before those of the engine."""
     e_w = w_max = 0.0
     for i in range(3):
         e_w += mon.e_past[i]
         w_max += abs(mon.y_past[i]) + mon.e_past[i]
-    for j in range(ANGLE_TEST, RPM_TEST):
-        mon.per_sample[j] = mon.n[SENSOR_OF[j]]
     bound_attitude(mon, y, w_max, e_w)
     bound_flow(mon, y, w_max, e_w)
     bound_density(mon, y)
@@ -113,14 +115,13 @@ def bound_residuals(mon, y):
 
 @kernel
 def bound_attitude(mon, y, w_max, e_w):
-    """Fill per_s for the tests of turning and of the angles, and per_sample for those of turning; sec:
-    largest 1 / cos(theta).
+    """Fill the bounds of the tests of turning and of the angles; sec: largest 1 / cos(theta).
 
         turning, axis i   per_s = EARTH_TURN + 2 drift + e_i + axes      per_sample = n_i + coupled_i
         axes =   w_max (e_phi + (1 + sec) e_theta + e_psi)        constant error: it changes J
                + tilt momentary / h                               it turns an axis, and back with another J
                + h w_max e_w                                      gyros, to second order in h
-        angles            per_s = sec angles + drift
+        angles            per_s = sec angles + drift               per_sample = n_i
         angles = EARTH_TURN + (1 + sec h w_max) e_w               gyros, to second order in h
                + 2 sec w_max (e_phi + e_theta)                    constant error in the inverse of J
 
@@ -139,9 +140,9 @@ def bound_attitude(mon, y, w_max, e_w):
     s_phi = abs(np.sin(y[PHI])) + n[PHI]
     coupled = s_theta * n[PSI], s_phi * n[PSI], s_phi * n[THETA]
     for i in range(3):
-        mon.per_s[i] = EARTH_TURN_RAD_S + 2.0 * mon.drift + e[i] + axes
-        mon.per_sample[i] = n[PHI + i] + coupled[i]
-        mon.per_s[ANGLE_TEST + i] = sec * angles + mon.drift
+        per_s = EARTH_TURN_RAD_S + 2.0 * mon.drift + e[i] + axes
+        set_bound(mon, i, per_s, n[PHI + i] + coupled[i])
+        set_bound(mon, ANGLE_TEST + i, sec * angles + mon.drift, n[PHI + i])
 
 
 @kernel
@@ -172,8 +173,8 @@ def bound_acceleration(mon, w_max, e_w):
 
 @kernel
 def bound_flow(mon, y, w_max, e_w):
-    """Fill per_s for the tests of flow and climb: the largest derivative of their kinematics with respect to
-    each reading, times the bound e of the reading.
+    """Fill the bounds of the tests of flow and climb. per_sample is n of the test's reading. per_s is the
+    largest derivative of the kinematics with respect to each reading, times the bound e of the reading:
 
         speed         e_a + growth a vane + h (a / V)^2 e_V
         each angle    growth (sec^2 ((e_a + a (vane + e_V / V)) / V + w_max vane) + sec e_w)
@@ -186,7 +187,7 @@ def bound_flow(mon, y, w_max, e_w):
     A gust of 1 m/s changes the speed by `gust`, and each angle by gust sec / V: gust is the factor by which
     gusts change faster than `gust_change` at this airspeed and height.
     """
-    h, e, a_size = mon.h, mon.e_past, mon.a_size
+    h, e, n, a_size = mon.h, mon.e_past, mon.n, mon.a_size
     V = max(lowest(mon, y, I_AIRSPEED), MIN_AIRSPEED_MPS)
     sec = secant(highest(mon, y, I_BETA))
     vane = e[I_ALPHA] + e[I_BETA]
@@ -197,18 +198,19 @@ def bound_flow(mon, y, w_max, e_w):
     height = max(lowest(mon, y, ALTITUDE), LEAST_HEIGHT_M)
     gust = np.sqrt(max(y[I_AIRSPEED] / mon.max_airspeed_mps, 1.0) * max(mon.low_m / height, 1.0))
     angle = growth * (sec**2 * ((e_a + a * (vane + e_V / V)) / V + w_max * vane) + sec * e_w)
-    mon.per_s[SPEED_TEST] = e_a + growth * a * vane + h * (a / V) ** 2 * e_V
+    set_bound(mon, SPEED_TEST, e_a + growth * a * vane + h * (a / V) ** 2 * e_V, n[I_AIRSPEED])
+    set_bound(mon, ALPHA_TEST, angle, n[I_ALPHA])
+    set_bound(mon, BETA_TEST, angle, n[I_BETA])
     mon.gust[SPEED_TEST] = gust
-    mon.per_s[ALPHA_TEST] = mon.per_s[BETA_TEST] = angle
     mon.gust[ALPHA_TEST] = mon.gust[BETA_TEST] = gust * sec / V
     path = (mon.y_past[I_AIRSPEED] + e_V) * (e[PHI] + e[THETA] + vane)
     lag = POSITION_FACTOR * h * max(a, a_size[1], a_size[2])
-    mon.per_s[CLIMB_TEST] = mon.wind_max + mon.gust_max + path + e_V + lag
+    set_bound(mon, CLIMB_TEST, mon.wind_max + mon.gust_max + path + e_V + lag, n[ALTITUDE])
 
 
 @kernel
 def bound_density(mon, y):
-    """Fill per_s and per_sample for the logarithm of the density, log(qdyn) - 2 log(V):
+    """Fill the bound of the logarithm of the density, log(qdyn) - 2 log(V):
 
         per_s         climb / DENSITY_SCALE_HEIGHT_M + sum power e_log / h
         e_log         const |1 / y - 1 / y_past| / (1 - const / y_min)
@@ -229,4 +231,4 @@ def bound_density(mon, y):
         e_log = e * abs(1.0 / y1 - 1.0 / y0) / max(1.0 - e / min(y1, y0), MIN_SHARE_LEFT)
         per_s += power * e_log / mon.h
         per_sample += power * mon.n[i] / max(y[i] - mon.e[i], floor)
-    mon.per_s[DENSITY_TEST], mon.per_sample[DENSITY_TEST] = per_s, per_sample
+    set_bound(mon, DENSITY_TEST, per_s, per_sample)

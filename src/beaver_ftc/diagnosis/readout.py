@@ -4,7 +4,9 @@ The layout of the records is the business of their stages alone. A readout copie
 change when the flight goes on. `fdi` is a record of `schemes.fdi_dtype`.
 """
 
-from functools import cached_property
+from collections.abc import Callable
+from functools import cached_property, reduce
+from operator import getitem
 from typing import Any, NamedTuple, TypeVar, get_type_hints
 
 import numpy as np
@@ -209,42 +211,40 @@ class SensorMonitor(NamedTuple):
     reading_bound: np.ndarray
 
 
+def _value(kind: Callable[[Any], Read], *path: str) -> cached_property[Read]:
+    """A property of a readout: one value of a kind, at a path of names in the record of the diagnosis."""
+    return cached_property(lambda readout: kind(reduce(getitem, path, readout._fdi)))
+
+
 class DiagnosisReadout:
     """The diagnosis at one frame. Each value is copied when it is read first, so a readout is for one frame;
-    the classes above document the values."""
+    the classes above document the values.
+
+    enabled, scheme_number       whether the diagnosis runs; number of its scheme (`state.scheme_number`)
+    diagnoses_all_types          whether it examines faults of every type
+    detected, detected_at_s      whether the alarm of the surfaces stands; when it was raised, s
+    isolated_estimator           number of the estimator whose fault is isolated, NOT_ISOLATED or
+                                 UNANTICIPATED
+    n_frames_in_block_so_far     frames that the block in progress has so far
+    statistical_alarm_level      statistic at which the statistical detector raises its alarm, standard
+                                 deviations
+    acceleration_variance_from_input_noise
+                                 variance by the noise of the model's own inputs and of the gust estimate,
+                                 (3,) (rad/s2)^2
+    """
+
+    enabled = _value(bool, "config", "enabled")
+    scheme_number = _value(int, "config", "scheme_number")
+    diagnoses_all_types = _value(bool, "config", "diagnoses_all_types")
+    detected = _value(bool, "verdict", "detected")
+    detected_at_s = _value(float, "verdict", "detected_at_s")
+    isolated_estimator = _value(int, "verdict", "isolated_estimator")
+    n_frames_in_block_so_far = _value(int, "types", "block", "n_so_far")
+    statistical_alarm_level = _value(float, "statistical", "test", "alarm_level")
+    acceleration_variance_from_input_noise = _value(np.array, "statistical", "noise", "Q")
 
     def __init__(self, fdi: np.void) -> None:
         self._fdi = fdi
-
-    @cached_property
-    def enabled(self) -> bool:
-        """Whether the diagnosis runs."""
-        return bool(self._fdi["config"]["enabled"])
-
-    @cached_property
-    def scheme_number(self) -> int:
-        """Number of its scheme, as `state.scheme_number` says."""
-        return int(self._fdi["config"]["scheme_number"])
-
-    @cached_property
-    def diagnoses_all_types(self) -> bool:
-        """Whether it examines faults of every type."""
-        return bool(self._fdi["config"]["diagnoses_all_types"])
-
-    @cached_property
-    def detected(self) -> bool:
-        """Whether the alarm of the surfaces stands."""
-        return bool(self._fdi["verdict"]["detected"])
-
-    @cached_property
-    def detected_at_s(self) -> float:
-        """When that alarm was raised, s."""
-        return float(self._fdi["verdict"]["detected_at_s"])
-
-    @cached_property
-    def isolated_estimator(self) -> int:
-        """Number of the estimator whose fault is isolated; NOT_ISOLATED or UNANTICIPATED of `state`."""
-        return int(self._fdi["verdict"]["isolated_estimator"])
 
     @cached_property
     def layout(self) -> LayoutOfAllSurfaces:
@@ -269,11 +269,6 @@ class DiagnosisReadout:
         return _read(FaultTypesConfig, self._fdi["types"]["config"], names)
 
     @cached_property
-    def n_frames_in_block_so_far(self) -> int:
-        """Frames that the block in progress has so far."""
-        return int(self._fdi["types"]["block"]["n_so_far"])
-
-    @cached_property
     def surface_fault_types(self) -> tuple[SurfaceFaultTypes, ...]:
         """Return for each surface its actuator and the types excluded on it."""
         return tuple(map(_read_surface, self._fdi["types"]["surface"]))
@@ -290,16 +285,6 @@ class DiagnosisReadout:
     def gust(self) -> GustReadout:
         """Gusts as the vanes see them."""
         return _read(GustReadout, self._fdi["statistical"]["gust"]["output"], "gusty measured")
-
-    @cached_property
-    def acceleration_variance_from_input_noise(self) -> np.ndarray:
-        """Variance by the noise of the model's own inputs and of the gust estimate, (3,) (rad/s2)^2."""
-        return np.array(self._fdi["statistical"]["noise"]["Q"])
-
-    @cached_property
-    def statistical_alarm_level(self) -> float:
-        """Statistic at which the statistical detector raises its alarm, standard deviations."""
-        return float(self._fdi["statistical"]["test"]["alarm_level"])
 
     @cached_property
     def statistical_filters(self) -> tuple[StatisticalBlock, ...]:

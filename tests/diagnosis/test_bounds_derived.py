@@ -6,10 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from beaver_ftc.design.model import design_record, nonlinear_response
-from beaver_ftc.diagnosis.bounds import (
-    add_declared_bound,
-    inertia_bounds,
-)
+from beaver_ftc.diagnosis.bounds import add_declared_bound
+from beaver_ftc.diagnosis.bounds_design import inertia_bounds
 from beaver_ftc.diagnosis.detection.filters import advance_bound
 from beaver_ftc.loop.assembly import configure_design
 from beaver_ftc.scenario.schema import Scenario

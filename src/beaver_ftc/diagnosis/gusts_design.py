@@ -4,20 +4,23 @@ Letters as in gusts.py, and: sigma m/s: standard deviation of a gust; in `config
 error of the acceleration that predicts the velocity, and a 1/s the decay rate of v_g.
 """
 
+from math import hypot, pi
+
 import numpy as np
 
 from beaver_ftc.aircraft.aircraft import EARTH_RATE_RAD_S, FORCES, GRAVITY_MPS2
 from beaver_ftc.compiled import fill
 from beaver_ftc.design import SCALE_M, rotation_lengths
+from beaver_ftc.design.model import jacobian
 from beaver_ftc.design.table import AIRSPEED, fill_table
 from beaver_ftc.diagnosis.detection.forces import VANE_E
-from beaver_ftc.diagnosis.deviations import flow_noise, gust_noise
 from beaver_ftc.diagnosis.gusts import MIN_UNMEASURED_SHARES
 from beaver_ftc.diagnosis.monitors.residual_bounds import EARTH_M_S2
 from beaver_ftc.scenario.declared import MASS_TOLERANCE, Declared, SensorErrors
 
 INTEGRATION_NOISE_GAIN = 1.6  # noise gain of the two-step method: sqrt(1.5^2 + 0.5^2), rounded up
 MAX_GUST_STDS = 4.0  # limit of the estimated gust velocity, standard deviations
+LARGE_ANGLE_RAD = 0.3  # attitudes and incidences of up to 17 deg
 MAX_PATH_SLOPE_RAD = 0.3  # largest slope of the path: this share of an error of gravity acts along the path
 MAX_DRAG_OVER_WEIGHT = 0.3  # largest drag over weight: errors of coefficients are a share of the drag
 
@@ -68,6 +71,33 @@ def add_gust_noise(
         forces["gust_noise"] = gust_noise(by_forces, design, y, u, span)
     for name in ("Q0", "Q"):
         stat["noise"][name] += gust_noise(std, design, y, u, span) ** 2
+
+
+def flow_noise(errors: SensorErrors, V: float) -> np.ndarray:
+    """Standard deviation (2,) rad of the noise of the flow's angles in level axes, computed from vanes,
+    airspeed and attitude:
+
+        hypot(sigma_vane, sigma_attitude) + LARGE_ANGLE_RAD (sigma_V / V + sigma_phi)
+
+    An error of pitch attitude or heading turns the flow as much as an error of a vane. V: airspeed, m/s.
+    """
+    pairs = (("alpha", "theta"), ("beta", "psi"))
+    sigma = [hypot(errors[vane].random, errors[attitude].random) for vane, attitude in pairs]
+    return np.array(sigma) + LARGE_ANGLE_RAD * (errors["V"].random / V + errors["phi"].random)
+
+
+def gust_noise(sigma: np.ndarray, model: np.void, y: np.ndarray, u: np.ndarray, b: float) -> np.ndarray:
+    """Standard deviation (3,) rad/s2 of the estimated effect of a gust, by the noise sigma (2,) rad of the
+    flow's angles:
+
+        sqrt((F_q s_q)^2 + (F_r s_r)^2)      s_q = pi V sigma_alpha / (4 b)      s_r = pi V sigma_beta / (3 b)
+
+    s: noise of the rotation of the air, rad/s (gusts.py); F (3,) 1/s: d(f + G u) / d rate; b: span, m; V:
+    airspeed, m/s.
+    """
+    s_q, s_r = sigma * pi * y[AIRSPEED] / (np.array([4.0, 3.0]) * b)
+    _, F_q, F_r = jacobian(model, np.zeros(3), y, u)[2].T  # without rates all of it is aerodynamic
+    return np.sqrt((F_q * s_q) ** 2 + (F_r * s_r) ** 2)
 
 
 def configure_gust_speed(gust: np.void, declared: Declared, level: float, V: float) -> None:

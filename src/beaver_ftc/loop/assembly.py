@@ -27,7 +27,7 @@ from beaver_ftc.diagnosis.detection.parity import USUAL_SIZE, StatisticalSize
 from beaver_ftc.diagnosis.detection.parity_design import required_size
 from beaver_ftc.diagnosis.detection.statistical_design import configure_statistics
 from beaver_ftc.diagnosis.isolation import estimator_names
-from beaver_ftc.diagnosis.monitors.records import configure_sensor_monitor
+from beaver_ftc.diagnosis.monitors.sensor_monitor_design import configure_sensor_monitor
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.accounts import accounts_dtype
 from beaver_ftc.loop.frame import true_faults_dtype

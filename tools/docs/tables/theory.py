@@ -3,7 +3,7 @@
 import numpy as np
 
 from beaver_ftc.aircraft import aircraft
-from beaver_ftc.diagnosis import bounds, error_map
+from beaver_ftc.diagnosis import bounds, bounds_design, error_map
 from beaver_ftc.diagnosis.detection import filters, likelihood, statistical, statistical_design, tones
 from beaver_ftc.diagnosis.monitors import numbering, residual_bounds
 from beaver_ftc.plant import instruments
@@ -19,7 +19,7 @@ CONSTANTS = (  # (section, meaning, module, name there, unit)
     (2, "rotation rate of the Earth", aircraft, "EARTH_RATE_RAD_S", "rad/s"),
     (2, "allowance for rounding", bounds, "ROUNDING_RAD_S2", "rad/s²"),
     (2, "limit of instrument noise, standard deviations", instruments, "NOISE_LIMIT_SIGMA", ""),
-    (2, "limit of gusts, standard deviations", bounds, "GUST_LIMIT_SIGMA", ""),
+    (2, "limit of gusts, standard deviations", bounds_design, "GUST_LIMIT_SIGMA", ""),
     (
         2,
         "bound outside the boxes of a derived model",

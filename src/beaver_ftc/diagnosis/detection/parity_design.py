@@ -28,8 +28,8 @@ from beaver_ftc.diagnosis.detection.likelihood import (
 )
 from beaver_ftc.diagnosis.detection.parity import AXIS_VIEW, VANE_VIEW, StatisticalSize
 from beaver_ftc.diagnosis.detection.rows import INERTIAL, RAW, VANED, VANELESS, set_columns
-from beaver_ftc.diagnosis.deviations import moment_axis
 from beaver_ftc.diagnosis.state import LOSS, NORMAL_FORCE, PITCH, ROLL, SIDE_FORCE, YAW
+from beaver_ftc.diagnosis.tolerances import moment_axis
 
 PITCH_PLANE = (PITCH, NORMAL_FORCE)
 ROLL_YAW_PLANE = (ROLL, YAW)

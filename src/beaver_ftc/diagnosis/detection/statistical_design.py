@@ -37,10 +37,10 @@ from beaver_ftc.diagnosis.detection.parity_design import (
 from beaver_ftc.diagnosis.detection.rows import RATES, configure_rows, set_columns
 from beaver_ftc.diagnosis.detection.statistical import MAX_ETA_RATE
 from beaver_ftc.diagnosis.detection.tones import N_TONES, configure_tones
-from beaver_ftc.diagnosis.deviations import coefficient_bounds, moment_axis
 from beaver_ftc.diagnosis.gusts import MIN_UNMEASURED_SHARES
 from beaver_ftc.diagnosis.gusts_design import add_gust_noise, configure_gust, configure_gust_speed
 from beaver_ftc.diagnosis.state import LOSS, PITCH
+from beaver_ftc.diagnosis.tolerances import coefficient_bounds, moment_axis
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.diagnosis import Statistical
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.compiled import apart, fill, kernel, record, sized
-from beaver_ftc.diagnosis import bounds, isolation, state
+from beaver_ftc.diagnosis import bounds_design, isolation, state
 from beaver_ftc.diagnosis import conclusion as conclusions
 from beaver_ftc.diagnosis.assessment import weighs_statistics
 from beaver_ftc.diagnosis.bounds import bound_dtype
@@ -73,7 +73,7 @@ def configure_diagnosis(fdi: np.void, pred: np.void, declared: Declared, travel:
     isolation.configure_isolation(fdi["isolation"], declared, rows, travel)
     if config.pairs and (refusal := pairs_refused(declared.sensors.declared, aircraft)):
         raise BadInput(f"{declared.name}: fdi.pairs: {refusal}, allowed: false")
-    bounds.configure_bound(fdi["bound"], declared, pred["design"])
+    bounds_design.configure_bound(fdi["bound"], declared, pred["design"])
     filters.configure_bank(fdi["bank"], config, declared, dt)
     fdae.configure_fdae(fdi["fdae"], declared)
     engine_monitor.configure_engine_monitor(fdi["engine_monitor"]["config"], aircraft)

@@ -39,9 +39,12 @@ def test_turbulence_is_as_strong_as_the_standard_has_it_at_a_height_and_no_less_
     assert record["memory"]["Q"] == pytest.approx(by_gusts)
 
     declared_errors = record_of(errors_dtype(4))
-    air = Dryden(turbulence)
-    declared_errors["wg_aloft"] = bounds_design.GUST_LIMIT_SIGMA * air.rotation_limit_rad_s(SPAN_M)
-    declared_errors["wg_1m"] = bounds_design.GUST_LIMIT_SIGMA * air.low_rotation_limit_rad_s(SPAN_M)
+    declared_errors["wg_aloft"] = bounds_design.GUST_LIMIT_SIGMA * Dryden(turbulence).rotation_limit_rad_s(
+        SPAN_M
+    )
+    declared_errors["wg_1m"] = bounds_design.GUST_LIMIT_SIGMA * Dryden(turbulence).low_rotation_limit_rad_s(
+        SPAN_M
+    )
     declared_errors["h0"], declared_errors["h1"] = 0.7, 0.02
     bounds.set_air_rotation(declared_errors, reading)
     sigma = max(1.9 * LOW[turbulence] / np.sqrt(h * b), 1.9 * HIGH[turbulence] / np.sqrt(1750.0 * b))

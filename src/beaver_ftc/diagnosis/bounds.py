@@ -90,19 +90,23 @@ def bound_dtype(n: int, boxes: int) -> np.dtype:
 
 
 @kernel
-def reading_bound(err, j, v):
-    """e = (o + s |v|) / (1 - s): bound on the error of reading j, whose value is v, in its unit.
+def largest_error(o, s, v):
+    """e = (o + s |v|) / (1 - s): bound on the error of a reading v that differs from the truth by at most
+    o + s |truth|, in the unit of v: |truth| is at most |v| + e, hence the divisor."""
+    return (o + s * abs(v)) / (1.0 - s)
 
-    o, s: the errors `e0`, of the offset, and `e1`, of the slope.
-    """
-    return (err.e0[j] + err.e1[j] * abs(v)) / (1.0 - err.e1[j])
+
+@kernel
+def reading_bound(err, j, v):
+    """Bound on the error of reading j, whose value is v, in its unit, by the declared `e0` and `e1`."""
+    return largest_error(err.e0[j], err.e1[j], v)
 
 
 @kernel
 def n_gyro(err, i, x):
     """n_i = o - |bias| + s (|x_i| + e): bound on the changing error of gyro i, rad/s.
 
-    o, s, e: as of `reading_bound`; |bias|: `steady`, what does not change of o; x rad/s: the reading.
+    o, s, e: as of `largest_error`; |bias|: `steady`, what does not change of o; x rad/s: the reading.
     """
     return err.e0[i] - err.steady[i] + err.e1[i] * (abs(x) + reading_bound(err, i, x))
 
@@ -204,12 +208,12 @@ def add_published_bound(x, model, c, b, w_E, eta):
 
 @kernel
 def least_height(h, h0, h1):
-    """max(h - (h0 + h1 |h|) / (1 - h1), LEAST_HEIGHT_M): the least true height, m, for a reading h whose
-    error is up to h0 + h1 |truth|.
+    """max(h - e, LEAST_HEIGHT_M): the least true height, m, for a reading h whose error is up to
+    h0 + h1 |truth|, and so up to e (`largest_error`).
 
     The ground is at sea level; the model of turbulence has no height below LEAST_HEIGHT_M.
     """
-    return max(h - (h0 + h1 * abs(h)) / (1.0 - h1), LEAST_HEIGHT_M)
+    return max(h - largest_error(h0, h1, h), LEAST_HEIGHT_M)
 
 
 @kernel

@@ -68,8 +68,9 @@ def fill_errors(err: np.void, declared: Declared, model: np.void) -> None:
     dI = inertia_bounds(declared.inertia, declared.mass)
     du = declared.deflections_rad
     err["model"] = model
-    err["model"]["moments"]["value"] = np.abs(model["moments"]["value"])
-    err["model"]["moments"]["value"][WORST, : dC.size] += dC
+    C = err["model"]["moments"]["value"]
+    C[:] = np.abs(C)
+    C[WORST, : dC.size] += dC
     for name, e in zip(InertiaCoefficients._fields, dI, strict=True):
         err["model"][name] = abs(model[name]) + np.array([0.0, e])  # measured, worst
     no_errors = errors.is_ideal and declared.servo_errors.is_none

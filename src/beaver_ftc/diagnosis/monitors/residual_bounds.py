@@ -14,6 +14,7 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.design import LEAST_HEIGHT_M
+from beaver_ftc.diagnosis.bounds import largest_error
 from beaver_ftc.diagnosis.monitors.numbering import (
     ALPHA_TEST,
     ANGLE_TEST,
@@ -54,12 +55,11 @@ def bound_readings(mon, y):
 
         e = (e_zero + e_slope |y|) / (1 - e_slope) [+ e_drift]      n = e - const + READING_ROUNDING |y|
 
-    The error is declared as a share e_slope of the truth, which is at most |y| + e: hence the divisor. The
-    attitude drifts by e_drift, slowly, so the drift is no part of n.
+    The attitude drifts by e_drift, slowly, so the drift is no part of n. A heading counts as an angle within
+    a half turn.
     """
     for i in range(N_SENSORS):
-        size = abs(wrapped(y[i]) if i == PSI else y[i])
-        e = (mon.e_zero[i] + mon.e_slope[i] * size) / (1.0 - mon.e_slope[i])
+        e = largest_error(mon.e_zero[i], mon.e_slope[i], wrapped(y[i]) if i == PSI else y[i])
         mon.n[i] = e - mon.const[i] + READING_ROUNDING * abs(y[i])
         mon.e[i] = e + mon.e_drift if PHI <= i <= PSI else e
 
@@ -98,7 +98,8 @@ def too_steep(mon, y):
 @kernel
 def set_bound(mon, j, per_s, per_sample):
     """Set the bound on the residual of test j, from the sample before, and by the reading of this sample."""
-    mon.per_s[j], mon.per_sample[j] = per_s, per_sample
+    mon.per_s[j] = per_s
+    mon.per_sample[j] = per_sample
 
 
 @kernel
@@ -187,7 +188,10 @@ def bound_flow(mon, y, w_max, e_w):
     A gust of 1 m/s changes the speed by `gust`, and each angle by gust sec / V: gust is the factor by which
     gusts change faster than `gust_change` at this airspeed and height.
     """
-    h, e, n, a_size = mon.h, mon.e_past, mon.n, mon.a_size
+    h = mon.h
+    e = mon.e_past
+    n = mon.n
+    a_size = mon.a_size
     V = max(lowest(mon, y, I_AIRSPEED), MIN_AIRSPEED_MPS)
     sec = secant(highest(mon, y, I_BETA))
     vane = e[I_ALPHA] + e[I_BETA]

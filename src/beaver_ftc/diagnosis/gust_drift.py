@@ -96,15 +96,14 @@ def unmeasured_drift(gust, V, i, k, as_rolling):
 
 @kernel
 def view_drift(gust, V, L_rate, L_force, subtracted):
-    """Intensity, (rad/s2)2/s, of the drift of a view by the rotation of the air:
+    """Intensity, (rad/s2)2/s, of the drift of a view by the rotation of the air, at an airspeed of V m/s:
 
         max(V, gust.output.V) sum_j (sqrt(share_j) |L_rate' C_j| + |L_force' C_j|)^2 Q_j
 
-    V m/s: airspeed.
     L_rate, L_force (3,) 1/s: sensitivity of the view's rates and of its forces to rotation about the body
     axes. subtracted: the gust estimate is subtracted from the rates, so that only a share of the gust acts on
     them. Otherwise share is 1, and each j adds (tau L_rate' C_dot_j)^2 Q_j / 2 if C turns fast, with tau of
-    the rolling gust, as in `gusts.fill_axes_rate`. The forces always contain the whole gust.
+    the rolling gust, as in `gusts.update_axes`. The forces always contain the whole gust.
     """
     C = gust.output.C
     mem = gust.memory
@@ -135,13 +134,10 @@ def add_turn_variance(gust, V, dt):
 @kernel
 def add_variance(gust, C, j, q):
     """Add to var_now the variance of the accelerations by a variance q of the gust about axis j: q times
-    `effect_product`. It counts for three frames: `finish_gust` adds it in this frame and the next, and one
-    frame more clears it.
-    """
+    `effect_product`."""
     for i in range(3):
         for k in range(3):
             gust.memory.var_now[i, k] += q * effect_product(gust, C, i, k, j)
-    gust.memory.n_turn = 3
 
 
 @kernel
@@ -151,11 +147,9 @@ def finish_turn_variance(gust):
     The axes may turn in the middle of a frame. A part of the effect is then in this frame and the rest in the
     next, so the variance counts in both frames.
     """
-    mem, out = gust.memory, gust.output
-    if mem.n_turn > 0:
-        mem.n_turn -= 1
-        for i in range(3):
-            for k in range(3):
-                out.var_turn[i, k] = mem.var_prev[i, k] + mem.var_now[i, k]
-        mem.var_prev = mem.var_now
-        mem.var_now[:] = 0.0
+    mem = gust.memory
+    for i in range(3):
+        for k in range(3):
+            gust.output.var_turn[i, k] = mem.var_prev[i, k] + mem.var_now[i, k]
+    mem.var_prev = mem.var_now
+    mem.var_now[:] = 0.0

@@ -97,8 +97,8 @@ GUST_MEMORY_RECORD = record(
     # diagnosis started, decaying.
     turn_now=float, turn_past=float, start_share=float,
     C_dot=(3, 3), turns_fast=int,  # turn of C, 1/s; whether it counts
-    # Variance of acc by that turn, (rad/s2)2, of this frame and of the one before; frames for which it counts
-    var_now=(3, 3), var_prev=(3, 3), n_turn=int,
+    # Variance of acc by that turn, (rad/s2)2, of this frame and of the one before
+    var_now=(3, 3), var_prev=(3, 3),
 )  # fmt: skip
 
 GUST_OUTPUT_RECORD = record(
@@ -133,9 +133,15 @@ def fill_force(gust, x, y, u, f):
 def fill_rotation(phi, th, T):
     """Fill T (3, 3), the rotation from level axes (forward, right, down) to body axes; angles rad."""
     s_phi, c_phi, s_th, c_th = np.sin(phi), np.cos(phi), np.sin(th), np.cos(th)
-    T[0, 0], T[0, 1], T[0, 2] = c_th, 0.0, -s_th
-    T[1, 0], T[1, 1], T[1, 2] = s_phi * s_th, c_phi, s_phi * c_th
-    T[2, 0], T[2, 1], T[2, 2] = c_phi * s_th, -s_phi, c_phi * c_th
+    T[0, :] = c_th, 0.0, -s_th
+    T[1, :] = s_phi * s_th, c_phi, s_phi * c_th
+    T[2, :] = c_phi * s_th, -s_phi, c_phi * c_th
+
+
+@kernel
+def to_level(v, T):
+    """T' v: a vector v (3,) in body axes, in level axes."""
+    return project_gust(v, T, 0), project_gust(v, T, 1), project_gust(v, T, 2)
 
 
 @kernel
@@ -152,8 +158,7 @@ def fill_velocity(gust, y, attitude):
     fill_rotation(attitude[0], attitude[1], mem.T)
     mem.heading = attitude[2]
     v = V * np.cos(alpha) * np.cos(beta), V * np.sin(beta), V * np.sin(alpha) * np.cos(beta)
-    for i in range(3):
-        mem.v[i] = project_gust(v, mem.T, i)
+    mem.v[:] = to_level(v, mem.T)
 
 
 @kernel
@@ -164,8 +169,8 @@ def start_gust(gust, y, attitude):
     (`schemes.prepare_takeover`).
     """
     fill_velocity(gust, y, attitude)
-    update_axes(gust, 1.0 + 0.0j)
     gust.output.V = y[AIRSPEED]
+    update_axes(gust, 1.0 + 0.0j, np.inf)
 
 
 @kernel
@@ -176,34 +181,27 @@ def turned(v, z):
 
 
 @kernel
-def update_axes(gust, z):
-    """Fill C for this instant, and keep the C of the instant before in C_dot, for `fill_axes_rate`.
+def update_axes(gust, z, dt):
+    """Fill C for this instant, its rate of change C_dot, 1/s, over the dt s since the instant before, and
+    whether the axes turn fast.
 
     z = exp(-i change of heading). The axes of JSBSim's gusts have the heading of the step before, so C has
     the rows of T in the level axes of that step.
-    """
-    T, C = gust.memory.T, gust.output.C
-    gust.memory.C_dot = C
-    for i in range(3):
-        C[i, :] = turned(T[i], z.conjugate())
 
-
-@kernel
-def fill_axes_rate(gust, dt, V):
-    """Fill `C_dot`, 1/s, from the C of the instant before, dt s ago, and whether the axes turn fast.
-
-    A constant unmeasured gust of deviation sigma = sqrt(Q tau / 2) then changes in body axes at the rate
+    A constant unmeasured gust of deviation sigma = sqrt(Q tau / 2) changes in body axes at the rate
     sigma C_dot. Over its lag tau this equals a random walk of (C_dot tau)^2 / 2 times its intensity. The turn
     is fast if that exceeds FAST_TURN_SHARE for the largest C_dot and the tau of the rolling gust.
     """
+    mem = gust.memory
     C = gust.output.C
-    C_dot = gust.memory.C_dot
     fastest = 0.0
     for i in range(3):
+        row = turned(mem.T[i], z.conjugate())
         for j in range(3):
-            C_dot[i, j] = (C[i, j] - C_dot[i, j]) / dt
-            fastest = max(fastest, abs(C_dot[i, j]))
-    gust.memory.turns_fast = 0.5 * (fastest * gust_lag(gust, ROLL, V)) ** 2 > FAST_TURN_SHARE
+            mem.C_dot[i, j] = (row[j] - C[i, j]) / dt
+            fastest = max(fastest, abs(mem.C_dot[i, j]))
+        C[i, :] = row
+    mem.turns_fast = 0.5 * (fastest * gust_lag(gust, ROLL, gust.output.V)) ** 2 > FAST_TURN_SHARE
 
 
 @kernel
@@ -220,10 +218,10 @@ def advance_gust(gust, y, attitude, dt):
     mem = gust.memory
     v = mem.v
     prev = mem.a_prev
-    g = gust.config.gravity
     turn = wrapped(attitude[2] - mem.heading)
     z = complex(np.cos(turn), -np.sin(turn))
-    a = project_gust(mem.f, mem.T, 0), project_gust(mem.f, mem.T, 1), project_gust(mem.f, mem.T, 2) + g
+    a_x, a_y, a_z = to_level(mem.f, mem.T)
+    a = a_x, a_y, a_z + gust.config.gravity
     for i in range(3):
         v[i] += dt * (1.5 * a[i] - 0.5 * (prev[i] if mem.has_prev else a[i]))
     mem.has_prev = 1
@@ -232,8 +230,7 @@ def advance_gust(gust, y, attitude, dt):
     fill_velocity(gust, y, attitude)  # v is as measured now
     dv = v_still[0] - v[0], v_still[1] - v[1], v_still[2] - v[2]
     update_gust_speed(gust, dv, y[AIRSPEED], dt)
-    update_axes(gust, z)
-    fill_axes_rate(gust, dt, gust.output.V)
+    update_axes(gust, z, dt)
     update_rotation(gust, dv, turn / dt, dt)
 
 
@@ -273,7 +270,8 @@ def update_rotation(gust, dv, psi_dot, dt):
     if larger < 1.0:
         mem.w[YAW] += dv[1] / (V * tau_r)
     else:
-        mem.v_g[:], mem.start_left = 0.0, 1.0
+        mem.v_g[:] = 0.0
+        mem.start_left = 1.0
 
 
 @kernel
@@ -285,7 +283,8 @@ def update_gust_speed(gust, dv, V, dt):
 
     dv (3,) m/s: change of the gust in level axes. V m/s: airspeed, which is the speed if no gust is measured.
     """
-    mem, cfg = gust.memory, gust.config
+    mem = gust.memory
+    cfg = gust.config
     gust.output.V = V
     if not gust.output.measured:
         return
@@ -326,7 +325,8 @@ def fill_gust_effect(gust, design, x, y, u):
 
     x (3,) rad/s and y (4 + signals,) as measured; u (n,) rad: positions of healthy surfaces.
     """
-    mem, out = gust.memory, gust.output
+    mem = gust.memory
+    out = gust.output
     fill_specific_force(gust, x, y, u)
     rate_damping(design, x, y, u, mem.scratch, out.rate_damping)
     mem.w_body[:] = out.acc[:] = out.acc_coarse[:] = 0.0
@@ -379,10 +379,12 @@ def drop_accelerometers(gust):
 
     Without a model of the forces the gust is then unmeasured, and all of its variance counts as unknown.
     """
-    mem, out = gust.memory, gust.output
+    mem = gust.memory
+    out = gust.output
     out.uses_accelerometers = 0
     if out.measured and not gust.config.has_forces:
-        out.measured, mem.share[:] = 0, 1.0
+        out.measured = 0
+        mem.share[:] = 1.0
         for j in (PITCH, YAW):
             add_variance(gust, out.C, j, 0.5 * gust_lag(gust, j, 1.0) * mem.Q[j])
 

@@ -80,42 +80,18 @@ def angle_of_chord(x):
 
 @kernel
 def fill_effects(mon, y_now):
-    """Fill H (N_INITIAL, RPM_TEST) and C (N_EFFECTS,): those of SPEED, m/s, and of DENSITY here, those of the
-    other tests by the functions above. They are evaluated at the sample before, y, from which y_now is
-    predicted.
+    """Fill H (N_INITIAL, RPM_TEST) and C (N_EFFECTS,) at y, the sample before, from which y_now is predicted.
 
-        dt2 = dt (1 + dt (a_max / V + w))        a_max, w: bounds on |a| and on the rate in the step
-        hypothesis    V                       alpha    beta    phi               theta
-        H, SPEED      0                       A        A       G share_across    G
-        H, DENSITY    |2 log(V_now / V)|      0        0       0                 0
-
-    V        the true log V changes by (1 + x) times what the reading shows. The density contains -2 log V,
-             so its residual has the error 2 x log(V_now / V)
-    alpha    in V' = a . v / V the direction of v is turned, and changes by x at most
-    beta     likewise
-    phi      a has the error x g cos(theta) across the body's first axis; V' takes its part along v
-    theta    a has the error x g, in the plane of the body's first axis and the vertical: V' takes at most all
-             of it. Along the first axis it is g (sin(reading) - sin(truth)) = x g cos(mean of both), which C
-             has. That mean is at most half the error away from the reading, and at most (reading + a right
-             angle) / 2
+    Here those of DENSITY: the true log V changes by (1 + x) times what the reading shows. The density
+    contains -2 log V, so its residual has the error 2 x log(V_now / V). w: bound on the rate, rad/s.
     """
-    dt, y, H, C = mon.h, mon.y_past, mon.initial.H, mon.initial.C
-    V = speed(y)
+    y = mon.y_past
+    C = mon.initial.C
     w = abs(y[P]) + abs(y[Q]) + abs(y[R])
-    a_max = max(mon.a_size[0], length(mon.a))
-    rate = in_plane(y, vector(y))
-    dt2 = dt * (1.0 + dt * (a_max / V + w))
-    A = dt2 * a_max
-    G = dt2 * mon.g
-    H[:, SPEED_TEST] = 0.0, A, A, G * share_across(y), G
-    pitch = abs(y[THETA])
-    mean = min(pitch + 0.5 * angle_of_chord(mon.initial.E[H_THETA]), 0.5 * pitch + 0.25 * np.pi)
-    C[PHI_IN_FLOW] = dt * mon.g * down(y)[1]
-    C[THETA_IN_FLOW] = dt * mon.g * np.cos(mean)
-    C[V_IN_DENSITY] = 2.0 * np.log(speed(y_now) / V)
-    H[H_AIRSPEED, DENSITY_TEST] = abs(C[V_IN_DENSITY])
+    C[V_IN_DENSITY] = 2.0 * np.log(speed(y_now) / speed(y))
+    mon.initial.H[H_AIRSPEED, DENSITY_TEST] = abs(C[V_IN_DENSITY])
     fill_attitude_effects(mon, y, w)
-    fill_flow_effects(mon, y, rate, dt2, a_max)
+    fill_flow_effects(mon, y, w)
     fill_climb_effects(mon, y)
 
 
@@ -136,7 +112,9 @@ def fill_attitude_effects(mon, y, w):
                                                               secants, of reading and truth differ by at most
                                                               x over both cosines; theta' has no theta
     """
-    dt, H, C = mon.h, mon.initial.H, mon.initial.C
+    dt = mon.h
+    H = mon.initial.H
+    C = mon.initial.C
     rates = vector(y)[1]
     turn = rates * unit(y[PHI])
     second = (dt * w) ** 2
@@ -170,16 +148,30 @@ def share_across(y):
 
 
 @kernel
-def fill_flow_effects(mon, y, rate, dt2, a_max):
-    """Fill H and C of the tests of flow, rad; sec_max: 1 / cos(beta_max), beta_max the largest |beta| if beta
-    is off. In the code: acc: `in_plane` of a; side: exp(i beta), and sb its |sin|; secs: sec sec_max.
+def fill_flow_effects(mon, y, w):
+    """Fill H and C of the tests of flow: SPEED, m/s; ALPHA and BETA, rad.
 
-                 ALPHA                                     BETA
-        V        sec A_V                                   sec A_V
-        alpha    sec (A_V + dt2 |rate| |sin(beta)|)        dt2 |rate| + A_V |sin(beta)|
-        beta     sec sec_max (dt2 |rate.real| + A_V)       A_V
-        phi      sec G cos(theta) / V                      sec G cos(theta) / V
-        theta    sec G / V                                 G (|sin(phi)| + |sin(beta)|) / V
+        dt2 = dt (1 + dt (a_max / V + w))       a_max, w: bounds on |a| and on the rate in the step
+        A = dt2 a_max       A_V = A / V         G = dt2 g
+
+                 SPEED            ALPHA                                   BETA
+        V        0                sec A_V                                 sec A_V
+        alpha    A                sec (A_V + dt2 |rate| |sin(beta)|)      dt2 |rate| + A_V |sin(beta)|
+        beta     A                sec sec_max (dt2 |rate.real| + A_V)     A_V
+        phi      G share_across   sec G cos(theta) / V                    sec G cos(theta) / V
+        theta    G                sec G / V                               G (|sin(phi)| + |sin(beta)|) / V
+
+    sec_max: 1 / cos(beta_max), beta_max the largest |beta| if beta is off. In the code: acc: `in_plane` of a;
+    side: exp(i beta), and sb its |sin|; secs: sec sec_max. Of SPEED:
+
+    alpha    in V' = a . v / V the direction of v is turned, and changes by x at most; beta likewise
+    phi      a has the error x g cos(theta) across the body's first axis; V' takes its part along v
+    theta    a has the error x g, in the plane of the body's first axis and the vertical: V' takes at most all
+             of it. Along the first axis it is g (sin(reading) - sin(truth)) = x g cos(mean of both), which C
+             has. That mean is at most half the error away from the reading, and at most (reading + a right
+             angle) / 2
+
+    Of ALPHA and BETA:
 
     V        alpha' and beta' have the part a / V, and a / truth = (1 + x) a / reading
     alpha    alpha' contains (a_z, a_x) / (V cos(beta)) and tan(beta) (p, r), both turned by alpha. beta'
@@ -192,10 +184,21 @@ def fill_flow_effects(mon, y, rate, dt2, a_max):
     theta    a has the error x g. alpha' has at most all of it, over V; beta' has the part sin(phi) along the
              second axis, and sin(beta) of the rest
     """
-    dt, H, C = mon.h, mon.initial.H, mon.initial.C
+    dt = mon.h
+    H = mon.initial.H
+    C = mon.initial.C
     V = speed(y)
+    a_max = max(mon.a_size[0], length(mon.a))
+    dt2 = dt * (1.0 + dt * (a_max / V + w))
+    A = dt2 * a_max
     G = dt2 * mon.g
-    A_V = dt2 * a_max / V
+    H[:, SPEED_TEST] = 0.0, A, A, G * share_across(y), G
+    pitch = abs(y[THETA])
+    mean = min(pitch + 0.5 * angle_of_chord(mon.initial.E[H_THETA]), 0.5 * pitch + 0.25 * np.pi)
+    C[PHI_IN_FLOW] = dt * mon.g * down(y)[1]
+    C[THETA_IN_FLOW] = dt * mon.g * np.cos(mean)
+    A_V = A / V
+    rate = in_plane(y, vector(y))
     acc = in_plane(y, mon.a)
     side = unit(y[I_BETA])
     sb = abs(side.imag)

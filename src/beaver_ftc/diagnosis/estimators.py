@@ -132,6 +132,12 @@ def narrow_sets(fie, nu, nu_max, shared):
 
 
 @kernel
+def prior_variance(fie):
+    """Variance of a theta that is uniformly distributed over its known set."""
+    return (fie.theta_max - fie.theta_min) ** 2 / 12.0
+
+
+@kernel
 def start_estimators(iso, n, x):
     """Start every estimator at the measured x, with the prior variance of theta; n (3,): of `n_gyro`.
 
@@ -140,7 +146,7 @@ def start_estimators(iso, n, x):
     for fie in iso.estimator[: iso.config.n_estimators]:
         copy(x, fie.xhat)
         copy(n, fie.B_lag)
-        fie.P[:] = (fie.theta_max - fie.theta_min) ** 2 / 12.0  # of a uniform distribution
+        fie.P[:] = prior_variance(fie)
         fie.set_lo[:] = -np.inf if iso.config.free else fie.theta_min
         fie.set_hi[:] = np.inf if iso.config.free else fie.theta_max
 
@@ -165,22 +171,29 @@ def update_residual(fie, kind, x):
 
 
 @kernel
+def move_theta(fie, i, th):
+    """Move the estimate of theta_i to th, projected onto its set; returns the step."""
+    old = fie.theta[i]
+    fie.theta[i] = min(max(th, fie.set_lo[i]), fie.set_hi[i])
+    return fie.theta[i] - old
+
+
+@kernel
 def least_squares_step(fie, i, eps, forget):
-    """One least-squares step of theta_i on a residual eps, rad/s, projected onto its set; returns the step.
+    """One least-squares step of theta_i on a residual eps, rad/s; returns the step.
 
         S = B^2 + Om^2 P      th <- th + P Om / S eps      P <- min(P B^2 / S / forget, prior)
 
-    forget = exp(-dt / tau), tau s: forgetting_time_s. prior: the variance (theta_max - theta_min)^2 / 12 of a
-    uniform theta. B bounds the filtered uncertainty, so the estimate changes no faster than its information
-    allows.
+    forget = exp(-dt / tau), tau s: forgetting_time_s. prior: `prior_variance`. B bounds the filtered
+    uncertainty, so the estimate changes no faster than its information allows.
     """
-    th, B2, P_Om = fie.theta[i], fie.B[i] ** 2, fie.P[i] * fie.Om[i]
+    B2 = fie.B[i] ** 2
+    P_Om = fie.P[i] * fie.Om[i]
     S = B2 + fie.Om[i] * P_Om
     if S <= 0.0:
         return 0.0
-    fie.theta[i] = min(max(th + P_Om / S * eps, fie.set_lo[i]), fie.set_hi[i])
-    fie.P[i] = min(fie.P[i] * B2 / S / forget, (fie.theta_max - fie.theta_min) ** 2 / 12.0)
-    return fie.theta[i] - th
+    fie.P[i] = min(fie.P[i] * B2 / S / forget, prior_variance(fie))
+    return move_theta(fie, i, fie.theta[i] + P_Om / S * eps)
 
 
 @kernel
@@ -191,11 +204,13 @@ def joint_least_squares(fie, forget):
     total = 0.0
     for i in range(3):
         if i > 0:
-            fie.theta[i], fie.P[i] = fie.theta[i - 1], fie.P[i - 1]
+            fie.theta[i] = fie.theta[i - 1]
+            fie.P[i] = fie.P[i - 1]
         if fie.effect.Z[i] != 0.0:
             total += least_squares_step(fie, i, fie.residual[i] - fie.Om[i] * total, forget)
             forget = 1.0
-    fie.theta[:], fie.P[:] = fie.theta[2], fie.P[2]
+    fie.theta[:] = fie.theta[2]
+    fie.P[:] = fie.P[2]
     return total
 
 
@@ -218,11 +233,10 @@ def advance_estimator(iso, fie, bound, x, F, dt):
         fie.xhat[i] = x[i] + dt * effect + cfg.a[i] * (fie.xhat[i] - x[i])
     step = joint_least_squares(fie, cfg.forget) if cfg.shared else 0.0
     for i in range(3):
-        a, Z = cfg.a[i], phi.Z[i]
+        a = cfg.a[i]
+        Z = phi.Z[i]
         if cfg.gradient:
-            old = th[i]
-            th[i] = min(max(old + dt * cfg.gain * fie.Om[i] * fie.residual[i], fie.set_lo[i]), fie.set_hi[i])
-            step = th[i] - old
+            step = move_theta(fie, i, th[i] + dt * cfg.gain * fie.Om[i] * fie.residual[i])
         elif not cfg.shared:
             step = least_squares_step(fie, i, fie.residual[i], cfg.forget)
         fie.Om[i] = a * fie.Om[i] + dt * Z

@@ -1,8 +1,7 @@
 """The isolation: hypotheses about the fault, the tests that exclude them, and the decision among them.
 
-The kernels stand in this order: tolerance of a position; record and configuration; then the steps of a frame,
-which are the effect of each fault, the tests that exclude it, and the decision. estimators.py has the
-estimators and their sets of theta.
+Record and configuration come first, then the steps of a frame: the effect of each fault, the tests that
+exclude it, and the decision. estimators.py has the estimators and their sets of theta.
 
 Every hypothesis is linear in one unknown parameter per axis, phi_i = h_i + theta_i Z_i:
 
@@ -67,75 +66,6 @@ from beaver_ftc.scenario.declared import Declared
 N_ROUNDS = 4
 
 
-@kernel
-def own_error(bound, s, i, u, level):
-    """max(eG u - eGu, 0) + extra, rad/s2: by how much the error of surface s on axis i at a distance of u rad
-    from neutral exceeds the error at its command. extra: of the map of the model's error, at this level.
-    """
-    return max(bound.eG[i, s] * u - bound.eGu[i, s], 0.0) + bound.extra[level, i]
-
-
-@kernel
-def widen_error(fie, bound, nu, n_substeps):
-    """Widen the tolerance of a position by the errors of the surface's own terms at that position:
-
-        r <- r + max(eG (u + first) - eGu, 0) + extra
-
-    eta_bar contains these errors at the commanded position. They grow with u, the largest distance from
-    neutral at which the surface can have been. The frame itself gives u, on the axis i of the largest |Z|:
-
-        u = travel;   N_ROUNDS times:   u <- min(u, max |interval of the position with the tolerance at u|)
-
-    Every round gives a valid bound; u is kept as u_far for the next frame. The same holds for a map of the
-    model's error, which is for healthy surfaces (`level`).
-
-    If a frame has n substeps, the surface may at the first of them still be where it was a frame before. That
-    is taken to be within u_far of neutral. For the mean position p the surface is then further out at the
-    other substeps, to make up for the first:  mean |position| <= |p| + first,  first = 2 u_far / n.
-    """
-    s, phi, emap, i = fie.surface, fie.effect, bound.error_map, 0
-    for j in range(1, 3):
-        if abs(phi.Z[j]) > abs(phi.Z[i]):
-            i = j
-    first = 2.0 * fie.u_far / n_substeps if n_substeps > 1 else 0.0
-    u, e = max(abs(fie.theta_min), abs(fie.theta_max)), bound.nu_max[i] + phi.r[i]
-    interval = (fie.theta_min, fie.theta_max)
-    level = level_near(emap, fie, interval, n_substeps)
-    for _ in range(N_ROUNDS):
-        e_own = own_error(bound, s, i, u + first, level)
-        lo, hi = explain(nu[i] - phi.h[i], e + e_own, phi.Z[i], fie.theta_min, fie.theta_max)
-        if lo > hi:
-            break
-        u, interval = min(u, max(abs(lo), abs(hi))), (lo, hi)
-        level = level_near(emap, fie, interval, n_substeps)
-    fie.u_far = u
-    if emap.one_free:
-        fie.share_far = share_used(emap, s, interval, fie.share_far, n_substeps)
-    for j in range(3):
-        phi.r[j] += own_error(bound, s, j, u + first, level)
-
-
-@kernel
-def level_near(emap, fie, interval, n_substeps):
-    """The level of the map that covers a surface whose mean position is in the interval, rad; 0 without a
-    map."""
-    if not emap.one_free:
-        return 0
-    return level_of_share(emap, share_used(emap, fie.surface, interval, fie.share_far, n_substeps))
-
-
-@kernel
-def add_to_mean(mean, phi, w, begins):
-    """mean <- mean + w phi, each an EFFECT_RECORD; w: share of a frame in its block. If the block `begins`
-    with this frame, the mean is zero before."""
-    if begins:
-        mean.h[:] = mean.Z[:] = mean.r[:] = 0.0
-    for i in range(3):
-        mean.h[i] += w * phi.h[i]
-        mean.Z[i] += w * phi.Z[i]
-        mean.r[i] += w * phi.r[i]
-
-
 @sized
 def isolation_dtype(n: int) -> np.dtype:
     """The isolation estimators, a loss and a position of each surface at most, and how the decision among
@@ -191,7 +121,9 @@ def configure_isolation(
     iso: np.void, declared: Declared, rows: tuple[EstimatorEntry, ...], travel: np.ndarray
 ) -> None:
     """Fill in the estimators and how the decision among them is sharpened; travel (2, n) rad."""
-    config, aircraft, dt = declared.fdi, declared.aircraft, 1.0 / declared.rate_hz
+    config = declared.fdi
+    aircraft = declared.aircraft
+    dt = 1.0 / declared.rate_hz
     losable = {name for damage in aircraft.damage.values() for name in damage.takes}
     fill(
         iso["config"], n_estimators=len(rows), mu_kind=_THRESHOLD_KINDS[config.thresholds],
@@ -212,6 +144,77 @@ def configure_isolation(
     # the damage may be what has excluded the others. So each estimator begins weakly excluded: its fault is
     # isolated only once it is confirmed.
     iso["estimator"]["weak"] = DAMAGE_EXCLUDES if config.weighs_chance and aircraft.damage else 0
+
+
+@kernel
+def own_error(bound, s, i, u, level):
+    """max(eG u - eGu, 0) + extra, rad/s2: by how much the error of surface s on axis i at a distance of u rad
+    from neutral exceeds the error at its command. extra: of the map of the model's error, at this level.
+    """
+    return max(bound.eG[i, s] * u - bound.eGu[i, s], 0.0) + bound.extra[level, i]
+
+
+@kernel
+def widen_error(fie, bound, nu, n_substeps):
+    """Widen the tolerance of a position by the errors of the surface's own terms at that position:
+
+        r <- r + max(eG (u + first) - eGu, 0) + extra
+
+    eta_bar contains these errors at the commanded position. They grow with u, the largest distance from
+    neutral at which the surface can have been. The frame itself gives u, on the axis i of the largest |Z|:
+
+        u = travel;   N_ROUNDS times:   u <- min(u, max |interval of the position with the tolerance at u|)
+
+    Every round gives a valid bound; u is kept as u_far for the next frame. The same holds for a map of the
+    model's error, which is for healthy surfaces (`level`).
+
+    If a frame has n substeps, the surface may at the first of them still be where it was a frame before. That
+    is taken to be within u_far of neutral. For the mean position p the surface is then further out at the
+    other substeps, to make up for the first:  mean |position| <= |p| + first,  first = 2 u_far / n.
+    """
+    s, phi, emap, i = fie.surface, fie.effect, bound.error_map, 0
+    for j in range(1, 3):
+        if abs(phi.Z[j]) > abs(phi.Z[i]):
+            i = j
+    first = 2.0 * fie.u_far / n_substeps if n_substeps > 1 else 0.0
+    u = max(abs(fie.theta_min), abs(fie.theta_max))
+    e = bound.nu_max[i] + phi.r[i]
+    interval = (fie.theta_min, fie.theta_max)
+    level = level_near(emap, fie, interval, n_substeps)
+    for _ in range(N_ROUNDS):
+        e_own = own_error(bound, s, i, u + first, level)
+        lo, hi = explain(nu[i] - phi.h[i], e + e_own, phi.Z[i], fie.theta_min, fie.theta_max)
+        if lo > hi:
+            break
+        u = min(u, max(abs(lo), abs(hi)))
+        interval = (lo, hi)
+        level = level_near(emap, fie, interval, n_substeps)
+    fie.u_far = u
+    if emap.one_free:
+        fie.share_far = share_used(emap, s, interval, fie.share_far, n_substeps)
+    for j in range(3):
+        phi.r[j] += own_error(bound, s, j, u + first, level)
+
+
+@kernel
+def level_near(emap, fie, interval, n_substeps):
+    """The level of the map that covers a surface whose mean position is in the interval, rad; 0 without a
+    map."""
+    if not emap.one_free:
+        return 0
+    return level_of_share(emap, share_used(emap, fie.surface, interval, fie.share_far, n_substeps))
+
+
+@kernel
+def add_to_mean(mean, phi, w, begins):
+    """mean <- mean + w phi, each an EFFECT_RECORD; w: share of a frame in its block. If the block `begins`
+    with this frame, the mean is zero before."""
+    if begins:
+        mean.h[:] = mean.Z[:] = mean.r[:] = 0.0
+    for i in range(3):
+        mean.h[i] += w * phi.h[i]
+        mean.Z[i] += w * phi.Z[i]
+        mean.r[i] += w * phi.r[i]
 
 
 @kernel
@@ -268,7 +271,8 @@ def exclude_fault(fie, t, waits, in_doubt):
     if in_doubt or (waits and not fie.pending):
         fie.pending = 1
     elif not fie.excluded:
-        fie.excluded, fie.excluded_at_s = 1, t
+        fie.excluded = 1
+        fie.excluded_at_s = t
 
 
 @kernel
@@ -279,7 +283,9 @@ def decide_isolation(iso, t):
     excluded estimator is not isolated unless it is confirmed. On an aircraft that declares damage, neither is
     one that has been the only one left for less than `hold_s`.
     """
-    n, remaining, last_exclusion_s = 0, NOT_ISOLATED, -np.inf
+    n = 0
+    remaining = NOT_ISOLATED
+    last_exclusion_s = -np.inf
     for j, fie in enumerate(iso.estimator[: iso.config.n_estimators]):
         if fie.excluded:
             last_exclusion_s = max(last_exclusion_s, fie.excluded_at_s)
@@ -311,7 +317,8 @@ def update_likelihood(fie, cfg, blocks, iso, loss_of, abrupt, hidden):
     that error, so all estimators become weakly excluded. cfg, blocks: of the statistical detector; loss_of
     (n,): index of the estimator of each surface's loss.
     """
-    fies, s = iso.estimator, fie.surface
+    fies = iso.estimator
+    s = fie.surface
     fie.unlikely = 0
     if not fie.confirmed and (fie.weak or not abrupt):
         fie.confirmed = statistical.confirms_loss(cfg, blocks, fies, loss_of, s)

@@ -347,23 +347,25 @@ def certificate_arrays(
     """
     est = fdi["isolation"]["estimator"][:n_estimators]
     srf = fdi["types"]["surface"]
-    always = {
-        "offset": est["effect"]["h"], "slope": est["effect"]["Z"], "spread": est["effect"]["r"],
-        "excluded": est["excluded"], "types": srf["sets"]["excluded"],
-    }  # fmt: skip
+    always = _columns(est["effect"], offset="h", slope="Z", spread="r")
+    always |= _columns(est, excluded="excluded") | _columns(srf["sets"], types="excluded")
     if diagnoses_all_types:
-        cmd = srf["commands"]
-        always |= {"command_low": cmd["cmd_min"], "command_high": cmd["cmd_max"]}
-        always |= {"least": cmd["u_min"], "greatest": cmd["u_max"]}
-    early = {"reach_low": est["reach_lo"], "reach_high": est["reach_hi"]}
+        ends = {"command_low": "cmd_min", "command_high": "cmd_max", "least": "u_min", "greatest": "u_max"}
+        always |= _columns(srf["commands"], **ends)
+    early = _columns(est, reach_low="reach_lo", reach_high="reach_hi")
     if has_statistical_detector:
         stat = fdi["statistical"]
         blk = stat["block"]
-        gust = stat["gust"]["output"]
         early |= {name: blk[name] for name in RECORDED_BLOCK_FIELDS}
-        early |= {"signature": blk["hypothesis"]["signature"], "bounded": stat["rows"]["eta"][0, :3]}
-        early |= {"air": gust["acc_mean"], "leap": gust["var_turn"]}
+        early |= _columns(blk["hypothesis"], signature="signature")
+        early["bounded"] = stat["rows"]["eta"][0, :3]
+        early |= _columns(stat["gust"]["output"], air="acc_mean", leap="var_turn")
     return always, early
+
+
+def _columns(record: np.void | np.ndarray, **fields: str) -> dict[str, np.ndarray]:
+    """Fields of a record, or of an array of records, by the names that a certificate gives them."""
+    return {name: record[field] for name, field in fields.items()}
 
 
 def alarm_flags(fdi: np.void) -> tuple[np.int64, np.int64]:

@@ -67,14 +67,18 @@ def assess_surfaces(out, cfg, conclusion, types, layout, fies, stat):
 
     The law has no target if no surface is isolated or accommodated, and no plug-in estimates effectiveness.
     """
-    all_types, j = cfg.diagnoses_all_types, conclusion.isolated_estimator
+    all_types = cfg.diagnoses_all_types
+    j = conclusion.isolated_estimator
     at_fault = isolated_surface(conclusion, fies)
     out.held = out.lags = 0
-    out.detected, out.diagnoses_all_types, out.isolated_surface = conclusion.detected, all_types, at_fault
+    out.detected = conclusion.detected
+    out.diagnoses_all_types = all_types
+    out.isolated_surface = at_fault
     out.no_target = j < 0 and conclusion.target < 0 and not conclusion.has_effectiveness
     for s in range(out.accommodation_mode.size):
         out.accommodation_mode[s] = types.surface[s].accommodation.mode if all_types else -1
-        out.effectiveness[s], out.at_once[s] = 1.0, 0
+        out.effectiveness[s] = 1.0
+        out.at_once[s] = 0
         out.offset[s] = out.lag[s] = 0.0
         if conclusion.has_effectiveness and conclusion.detected:
             out.effectiveness[s] = conclusion.effectiveness[s]
@@ -82,7 +86,8 @@ def assess_surfaces(out, cfg, conclusion, types, layout, fies, stat):
             assess_surface(out, types, layout, fies, s)
         elif s == at_fault and not all_types:
             theta, information = isolated_theta(cfg, conclusion, layout, fies, stat, s)
-            out.effectiveness[s], out.at_once[s] = 1.0 + theta, information > MIN_INFORMATION
+            out.effectiveness[s] = 1.0 + theta
+            out.at_once[s] = information > MIN_INFORMATION
 
 
 @kernel
@@ -92,7 +97,9 @@ def hold_assessment(out, types):
 
     Lags, and offsets that vary from frame to frame, cannot be estimated without the sensor, and become zero.
     """
-    out.held, out.lags, out.lag[:] = 1, 0, 0.0
+    out.held = 1
+    out.lags = 0
+    out.lag[:] = 0.0
     for s, surf in enumerate(types.surface):
         if out.accommodation_mode[s] != GIVE_UP and not verdict.constant_remains(surf):
             out.offset[s] = 0.0
@@ -113,7 +120,8 @@ def assess_surface(out, types, layout, fies, s):
     if mode == SCALE_COMMAND:
         out.effectiveness[s] = modes.remaining_effectiveness(types, layout, fies, s)
     elif mode == GIVE_UP:
-        out.effectiveness[s], out.at_once[s] = 0.0, 1
+        out.effectiveness[s] = 0.0
+        out.at_once[s] = 1
         out.offset[s] = surf.last.u + modes.deflection_error(surf, possible)
     elif mode == SUBTRACT_OFFSET:
         out.offset[s] = modes.deflection_error(surf, possible)

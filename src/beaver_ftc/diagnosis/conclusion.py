@@ -69,7 +69,9 @@ def reset_conclusion(conclusion: np.void) -> None:
 def latch_alarm(conclusion, axis, t):
     """Latch an alarm at t s on an axis. Only the first alarm is recorded."""
     if not conclusion.detected:
-        conclusion.detected, conclusion.detected_at_s, conclusion.axis = 1, t, axis
+        conclusion.detected = 1
+        conclusion.detected_at_s = t
+        conclusion.axis = axis
 
 
 @kernel
@@ -77,7 +79,8 @@ def set_isolated(conclusion, j, t):
     """Replace the isolated fault by that of estimator j, or by NOT_ISOLATED or UNANTICIPATED; if this is a
     change, the time of isolation becomes t s."""
     if j != conclusion.isolated_estimator:
-        conclusion.isolated_estimator, conclusion.isolated_at_s = j, t
+        conclusion.isolated_estimator = j
+        conclusion.isolated_at_s = t
 
 
 @kernel
@@ -110,7 +113,9 @@ def withdraw_conclusion(conclusion):
     axis and the time of the type count only with an alarm and a type, and has_effectiveness is a plug-in's,
     which has no sensor monitor.
     """
-    conclusion.detected, conclusion.isolated_estimator, conclusion.fault_type = 0, NOT_ISOLATED, -1
+    conclusion.detected = 0
+    conclusion.isolated_estimator = NOT_ISOLATED
+    conclusion.fault_type = -1
     conclusion.detected_at_s = conclusion.isolated_at_s = -1.0
     conclusion.target = conclusion.accommodation_mode = -1
 
@@ -121,7 +126,8 @@ def update_interval(conclusion, s, isolated, t, kind, reason):
     with this frame, store it with the reason; if it continues and its type ends or changes, store the type
     that it had.
     """
-    isolated_since, old_type = conclusion.from_s[s], conclusion.isolated_type[s]
+    isolated_since = conclusion.from_s[s]
+    old_type = conclusion.isolated_type[s]
     if isolated and isolated_since < 0.0:
         conclusion.from_s[s] = t
     elif isolated_since >= 0.0 and not isolated:
@@ -141,7 +147,8 @@ def update_interval(conclusion, s, isolated, t, kind, reason):
         )
     kind = kind if isolated else -1
     if kind != old_type:
-        conclusion.isolated_type[s], conclusion.type_from_s[s] = kind, t
+        conclusion.isolated_type[s] = kind
+        conclusion.type_from_s[s] = t
 
 
 @kernel
@@ -149,8 +156,11 @@ def store_withdrawn(store, n, s, kind, from_s, to_s, reason):
     """Fill the next record of a store (MAX_WITHDRAWN,) in which n records are filled, or its last record if
     it is full; return the number of withdrawals so far, n + 1."""
     entry = store[min(n, MAX_WITHDRAWN - 1)]
-    entry.surface, entry.fault_type, entry.reason = s, kind, reason
-    entry.from_s, entry.to_s = from_s, to_s
+    entry.surface = s
+    entry.fault_type = kind
+    entry.reason = reason
+    entry.from_s = from_s
+    entry.to_s = to_s
     return n + 1
 
 

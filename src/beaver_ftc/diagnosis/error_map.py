@@ -58,7 +58,8 @@ def fill_map(emap: np.void, aircraft: Aircraft, one_free: bool, two_free: bool) 
     declared = aircraft.file.model_error_map
     if declared is None:
         return
-    n_levels, n_rows = len(declared.travel_share), len(declared.until_s)
+    n_levels = len(declared.travel_share)
+    n_rows = len(declared.until_s)
     reach = np.array([declared.stand_ins if s in aircraft.stand_ins else 1.0 for s in aircraft.surfaces])
     lo, hi = np.transpose([(travel.min_rad, travel.max_rad) for travel in aircraft.travel.values()])
     fill(
@@ -68,10 +69,10 @@ def fill_map(emap: np.void, aircraft: Aircraft, one_free: bool, two_free: bool) 
     emap["until_s"][:n_rows] = declared.until_s
     emap["share"][:n_levels] = declared.travel_share
     for b, box in enumerate(declared.boxes):
-        ends = np.transpose(box.ends(aircraft.signals))
-        emap["lo"][b, : ends.shape[1]], emap["hi"][b, : ends.shape[1]] = ends
-        errors = np.stack([box.error_p_rad_s2, box.error_q_rad_s2, box.error_r_rad_s2], axis=-1)
-        emap["e"][:n_rows, b, :n_levels] = errors
+        for i, end in enumerate(box.ends(aircraft.signals)):
+            emap["lo"][b, i], emap["hi"][b, i] = end
+        for i, error in enumerate((box.error_p_rad_s2, box.error_q_rad_s2, box.error_r_rad_s2)):
+            emap["e"][:n_rows, b, :n_levels, i] = error
         emap["Cn"][b] = box.engines_apart or 0.0
 
 

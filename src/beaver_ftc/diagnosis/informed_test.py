@@ -59,7 +59,8 @@ class WhiteningFilter:
     """
 
     def __init__(self, context: Context, broken: int | None = None) -> None:
-        declared, dt = context.declared, context.dt_s
+        declared = context.declared
+        dt = context.dt_s
         tau = np.concatenate((declared.gust_time_s, np.full(3, UNEXPLAINED_MEMORY_S)))
         sigma = np.concatenate((declared.gust_rad_s, context.constant_rad_s2 / np.sqrt(2.0)))
         a = np.exp(-dt / tau)

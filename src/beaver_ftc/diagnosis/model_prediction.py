@@ -134,13 +134,14 @@ def add_to_sums(pred, bound, layout, all_types):
         sums.F[i] += w * pred.f[i]
         sums.eta_bar[i] += w * bound.eta_now[i]
         for s in range(u.size):
-            sums.G[i, s] += w * G[i, s]
-            Gu = w * G[i, s] * u[s]
-            sums.Gu[i, s] += Gu
-            sums.F[i] += Gu
+            w_G = w * G[i, s]
+            sums.G[i, s] += w_G
+            sums.Gu[i, s] += w_G * u[s]
+            sums.F[i] += w_G * u[s]
             if bound.has_eG:
-                sums.eG[i, s] += w * eG[i, s]
-                sums.eGu[i, s] += w * eG[i, s] * abs(u[s])
+                w_eG = w * eG[i, s]
+                sums.eG[i, s] += w_eG
+                sums.eGu[i, s] += w_eG * abs(u[s])
         if bound.error_map.one_free:
             for j in range(bound.error_map.n_levels):
                 bound.extra[j, i] += w * extra_bound(bound.error_map, j, i)
@@ -155,7 +156,8 @@ def fill_means(pred, bound):
     """Copy the sums, which are complete, to the means over the elapsed frame: G, G u of each surface,
     F = f + G u, the extremes, and the bounds eta_bar, eG and eGu. G_old keeps the G of the frame before. With
     several instants a frame, fill e_Gu, too."""
-    sums, means = pred.sums, pred.means
+    sums = pred.sums
+    means = pred.means
     copy(means.G, means.G_old)
     copy(sums.G, means.G)
     copy(sums.Gu, means.Gu)
@@ -175,7 +177,9 @@ def fill_means(pred, bound):
 @kernel
 def fill_old_effects(means):
     """Gu_old = (G_old / G) Gu, (3, n) rad/s2: the effect of each surface with G of the frame before."""
-    G_old, G, Gu = means.G_old, means.G, means.Gu
+    G_old = means.G_old
+    G = means.G
+    Gu = means.Gu
     for i in range(3):
         for s in range(G.shape[1]):
             means.Gu_old[i, s] = (G_old[i, s] / G[i, s] if G[i, s] != 0.0 else 0.0) * Gu[i, s]
@@ -258,7 +262,8 @@ def predict_known(pred, with_faults, effectiveness, bias, with_biases):
     effectiveness (n,), bias (n,) rad: estimates for each surface. Unless `with_faults`, F_known is F; unless
     `with_biases`, the last sum is left out.
     """
-    F, means = pred.F_known, pred.means
+    F = pred.F_known
+    means = pred.means
     copy(means.F, F)
     if with_faults:
         for i in range(3):

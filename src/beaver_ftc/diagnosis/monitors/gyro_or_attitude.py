@@ -82,7 +82,8 @@ def advance_gyro_estimate(mon, nu, eta, dt):
     W (3,) rad/s is the error of the gyros, if all of the innovation is due to it. nu, eta (3,) rad/s2:
     innovation of the frame, and the bound on it that the declared uncertainty gives.
     """
-    w, B = mon.w, mon.w_bound
+    w = mon.w
+    B = mon.w_bound
     w0, B0 = components(vector(w)), components(vector(B))
     for i in range(3):
         w[i] = dt * nu[i]
@@ -101,7 +102,8 @@ def follow_gyro_errors(mon):
     for i, g in enumerate(mon.gyro):
         w = -mon.residual[i] / mon.h
         if mon.substep == 0:
-            g.shown_past, g.shown = g.shown, w
+            g.shown_past = g.shown
+            g.shown = w
             g.most_older, g.most_past, g.most = g.most_past, g.most, 0.0
             g.least_past, g.least = g.least, np.inf
         else:

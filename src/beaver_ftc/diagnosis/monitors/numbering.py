@@ -21,6 +21,7 @@ TEST_NAMES = (
 N_EQUATIONS = len(TEST_NAMES)  # number of the first test of a duplicate sensor
 TURN_TEST, ANGLE_TEST = 0, 3
 SPEED_TEST, ALPHA_TEST, BETA_TEST, DENSITY_TEST, CLIMB_TEST, RPM_TEST, PRESSURE_TEST = range(6, 13)
+# By test of an equation: the place in the readings of the sensor whose row names the test
 SENSOR_OF = tuple(_NAMED.index(name) for name in TEST_NAMES)
 DUPLICATES = tuple((SENSORS.index(row.name), row.equal) for row in ROWS if row.equal is not None)
 N_TESTS = N_EQUATIONS + len(DUPLICATES)

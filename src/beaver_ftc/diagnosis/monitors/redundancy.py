@@ -133,7 +133,9 @@ def predict_readings(mon):
     A vector of fixed direction, turned by step, is q* v q: its components in the axes after the step. At the
     end a, turned by step, is the a_past of the next sample.
     """
-    h, y, past = mon.h, mon.y_pred, mon.y_past
+    h = mon.h
+    y = mon.y_pred
+    past = mon.y_past
     w = vector(past)
     s1 = 1.0 + 0.5 * h * w[0]
     s2 = 0.5 * h * w[1]

@@ -62,10 +62,13 @@ def components(q):
 
 @kernel
 def attitude(y):
-    """q of the Euler angles: psi about the third axis, theta about the second, phi about the first."""
-    heading, pitch = unit(0.5 * y[PSI]), unit(0.5 * y[THETA])
-    level = (complex(heading.real), 1j * heading.imag), (complex(pitch.real), complex(pitch.imag))
-    return times(times(level[0], level[1]), (unit(0.5 * y[PHI]), 0j))
+    """q of the Euler angles, cos + axis sin of half an angle each: psi about the third axis (k = i j), theta
+    about the second (j), phi about the first (i)."""
+    heading = unit(0.5 * y[PSI])
+    pitch = unit(0.5 * y[THETA])
+    by_psi = complex(heading.real), 1j * heading.imag
+    by_theta = complex(pitch.real), complex(pitch.imag)
+    return times(times(by_psi, by_theta), (unit(0.5 * y[PHI]), 0j))
 
 
 @kernel

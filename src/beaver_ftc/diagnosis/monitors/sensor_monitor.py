@@ -121,7 +121,8 @@ def check_sensors(mon, pred, measured, verdict, bank, bound, dt, t):
 @kernel
 def start_monitor(mon, y, force, t):
     """Start with the first sample y, force (3,) m/s2, at t s: no earlier sample can be compared with it."""
-    mon.t_start, mon.e_drift = t, mon.drift * t
+    mon.t_start = t
+    mon.e_drift = mon.drift * t
     restart_comparison(mon)
     start_tests(mon, y, force)
     start_bounds(mon, y)
@@ -138,7 +139,8 @@ def isolate_sensor(mon, measured, verdict, bank, bound, dt, t):
     o = mon.output
     worst = np.argmax(mon.ratio)
     if mon.substep == 0 or mon.ratio[worst] > o.top_ratio:  # of the samples of this frame
-        o.worst_test_index, o.top_ratio = worst, mon.ratio[worst]
+        o.worst_test_index = worst
+        o.top_ratio = mon.ratio[worst]
     for i in range(N_SENSORS):
         if measured.missing[i] and o.isolated_sensor == NO_SENSOR:
             mark_isolated(mon, verdict, i, t)
@@ -170,7 +172,8 @@ def raise_alarm(mon, verdict, t):
     o = mon.output
     if o.alarmed:
         return
-    o.alarmed, o.alarmed_at_s = 1, t
+    o.alarmed = 1
+    o.alarmed_at_s = t
     if verdict.detected:
         o.keeps_surface = verdict.detected_at_s < t - MIN_LEAD_S
         if not o.keeps_surface:  # the rates have shown the same fault first

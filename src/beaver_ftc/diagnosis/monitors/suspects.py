@@ -81,12 +81,12 @@ def latch_exceeded(mon):
     """
     exceeded = mon.exceeded
     for j in range(N_TESTS):
-        exceeds = mon.ratio[j] > 1.0
+        counts = mon.ratio[j] > 1.0
         if j < SPEED_TEST:
             first = j - j % 3  # of the three axes, or angles
             for i in range(first, first + 3):
-                exceeds &= abs(mon.r[j, 0]) > COUPLING_SHARE * abs(mon.r[i, 0])
-        exceeded[j] |= exceeds
+                counts &= abs(mon.r[j, 0]) > COUPLING_SHARE * abs(mon.r[i, 0])
+        exceeded[j] |= counts
     latch_refuted(mon, exceeded)
 
 

@@ -126,25 +126,19 @@ def update_interval(conclusion, s, isolated, t, kind, reason):
     with this frame, store it with the reason; if it continues and its type ends or changes, store the type
     that it had.
     """
-    isolated_since = conclusion.from_s[s]
+    since = conclusion.from_s[s]
+    type_since = conclusion.type_from_s[s]
     old_type = conclusion.isolated_type[s]
-    if isolated and isolated_since < 0.0:
+    if isolated and since < 0.0:
         conclusion.from_s[s] = t
-    elif isolated_since >= 0.0 and not isolated:
-        conclusion.n_gone = store_withdrawn(
-            conclusion.gone, conclusion.n_gone, s, old_type, isolated_since, t, reason
-        )
+    elif since >= 0.0 and not isolated:
+        n = conclusion.n_gone
+        conclusion.n_gone = store_withdrawn(conclusion.gone, n, s, old_type, since, t, reason)
         conclusion.from_s[s] = -1.0
     elif old_type >= 0 and kind != old_type:
-        conclusion.n_gone_types = store_withdrawn(
-            conclusion.withdrawn_types,
-            conclusion.n_gone_types,
-            s,
-            old_type,
-            conclusion.type_from_s[s],
-            t,
-            reason,
-        )
+        n = conclusion.n_gone_types
+        types = conclusion.withdrawn_types
+        conclusion.n_gone_types = store_withdrawn(types, n, s, old_type, type_since, t, reason)
     kind = kind if isolated else -1
     if kind != old_type:
         conclusion.isolated_type[s] = kind

@@ -5,9 +5,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.diagnosis.detection.filters import (
-    fault_range,
-)
+from beaver_ftc.diagnosis.detection.directions import project, project_size
+from beaver_ftc.diagnosis.detection.intervals import fault_range
 from beaver_ftc.diagnosis.model_prediction import (
     fill_means,
 )
@@ -23,7 +22,9 @@ def over(frames):
 @kernel
 def limits(frames, surface):
     fie = frames[0].fdi.isolation.estimator[surface]
-    return fault_range(fie, 0), fault_range(fie, 3)
+    fault, m = fie.effect, fie.parity_direction
+    along = project(m, fault.h), project(m, fault.Z), project_size(m, fault.r)
+    return fault_range(fie, fault.h[0], fault.Z[0], fault.r[0]), fault_range(fie, *along)
 
 
 def record(substeps):

@@ -118,7 +118,9 @@ def test_the_truth_has_a_type_of_its_own():
 
 def test_forces_are_those_of_the_accelerometers(calls):
     """What is weighed has the errors of the instruments, as what is compared with the model has."""
-    assert of(calls, "diagnosis")["beaver_ftc.diagnosis.detection.rows.update_forces"] == [["other", "plain"]]
+    assert of(calls, "diagnosis")["beaver_ftc.diagnosis.detection.forces.update_forces"] == [
+        ["other", "plain"]
+    ]
     errors = {"ax": {"bias_mps2": 0.3}, "ay": {"scale_error": -0.5}, "az": {"quantum_mps2": 2.0}}
     given = {"name": "x", "duration_s": 0.5, "reference": {}, "fdi": WEIGHED}
     true, read = (Loop(load(given | {"sensors": sensors})) for sensors in ("ideal", errors))

@@ -34,7 +34,8 @@ a constant loss (`fdi.fault_profile: abrupt`) the sets of all frames since the a
 import numpy as np
 
 from beaver_ftc.compiled import copy, kernel, record
-from beaver_ftc.diagnosis.detection.filters import advance_bound, published_interval, residual_interval
+from beaver_ftc.diagnosis.detection.filters import advance_bound
+from beaver_ftc.diagnosis.detection.intervals import published_interval, residual_interval
 from beaver_ftc.diagnosis.sets import explain, intersect
 from beaver_ftc.diagnosis.state import INTERVAL_THRESHOLD, PUBLISHED_THRESHOLD
 from beaver_ftc.scenario.diagnosis import MAX_POLES
@@ -57,8 +58,8 @@ ESTIMATOR_RECORD = record(
     # In the last frame: the largest distance from neutral that the surface's mean position can have had, rad;
     # the largest share of its travel that it can have used.
     u_far=float, share_far=float,
-    # test on the residuals of the bank (filters.py): the parity direction m; the reach, rad/s, by filter, on
-    # roll, pitch, yaw and along m
+    # test on the residuals of the bank (intervals.py): the parity direction m; the reach, rad/s, by filter,
+    # on roll, pitch, yaw and along m
     parity_direction=3, reach_lo=(MAX_POLES, 4), reach_hi=(MAX_POLES, 4),
     set_lo=3, set_hi=3,  # part of the known set that agrees with all frames since the alarm
 )  # fmt: skip

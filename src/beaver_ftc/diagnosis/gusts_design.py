@@ -13,7 +13,6 @@ from beaver_ftc.compiled import fill
 from beaver_ftc.design import SCALE_M, rotation_lengths
 from beaver_ftc.design.model import jacobian
 from beaver_ftc.design.table import AIRSPEED, fill_table
-from beaver_ftc.diagnosis.detection.forces import VANE_E
 from beaver_ftc.diagnosis.gusts import MIN_UNMEASURED_SHARES
 from beaver_ftc.diagnosis.monitors.residual_bounds import EARTH_M_S2
 from beaver_ftc.scenario.declared import MASS_TOLERANCE, Declared, SensorErrors
@@ -67,7 +66,7 @@ def add_gust_noise(
         std += INTEGRATION_NOISE_GAIN * errors.each("random", ("az", "ay")) * dt / y[AIRSPEED]
     if forces["in_use"]:
         components = forces["component"][::-1]  # normal force first: `gust_noise` takes incidence, sideslip
-        by_forces = np.sqrt(components["var_acc"]) / np.abs(components["vane"][:, VANE_E])
+        by_forces = np.sqrt(components["var_acc"]) / np.abs(components["e_vane"])
         forces["gust_noise"] = gust_noise(by_forces, design, y, u, span)
     for name in ("Q0", "Q"):
         stat["noise"][name] += gust_noise(std, design, y, u, span) ** 2

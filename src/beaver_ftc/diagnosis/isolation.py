@@ -17,7 +17,7 @@ Likelihood ratios exclude a loss of the published class, or confirm it. A confir
 likelihood. A loss that only the end of an undetected earlier loss in pitch could explain is weakly excluded:
 it is not isolated.
 
-The sharpened tests (detection/filters.py, set membership in estimators.py) exclude as well, each by its own
+The sharpened tests (detection/intervals.py, set membership in estimators.py) exclude as well, each by its own
 switch. The first test that fails excludes a fault.
 
 Symbols of the kernels:
@@ -45,7 +45,7 @@ import numpy as np
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.compiled import fill, kernel, record, sized
 from beaver_ftc.diagnosis.detection import parity, statistical
-from beaver_ftc.diagnosis.detection.filters import advance_reach, is_reachable
+from beaver_ftc.diagnosis.detection.intervals import advance_reach, is_reachable
 from beaver_ftc.diagnosis.error_map import level_of_share, share_used
 from beaver_ftc.diagnosis.estimators import ESTIMATOR_RECORD, narrow_sets, theta_explains, update_residual
 from beaver_ftc.diagnosis.sets import explain

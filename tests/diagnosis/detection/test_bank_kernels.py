@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from kernels import DT, POLES, estimator, new_fdi, on, weights
 
-from beaver_ftc.diagnosis.detection import filters
+from beaver_ftc.diagnosis.detection import filters, intervals
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -17,7 +17,7 @@ def test_what_a_fault_can_have_done_is_the_filtered_extreme_of_what_it_does(seed
     effect["h"], effect["Z"] = 0.2 * rng.normal(size=3), rng.normal(size=3)
     effect["r"] = rng.uniform(0, 0.3, 3)
     for _ in range(3):
-        on(filters.advance_reach, fdi, fie)
+        on(intervals.advance_reach, fdi, fie)
     across = np.vstack([np.eye(3), fie["parity_direction"]])
     at_ends = [effect["h"] + theta * effect["Z"] for theta in (-1.0, 0.5)]
     does = np.array([*at_ends, np.zeros(3)]) @ across.T

@@ -8,13 +8,10 @@ from beaver_ftc.aircraft import load
 from beaver_ftc.aircraft.aircraft import FORCES
 from beaver_ftc.aircraft.schema import SIDESLIP_RATE
 from beaver_ftc.design.table import fill_table
-from beaver_ftc.diagnosis.detection import forces
-from beaver_ftc.diagnosis.detection.forces import (
-    NORMAL_INDEX,
-    SIDE_INDEX,
-)
+from beaver_ftc.diagnosis.detection import flow_angles
+from beaver_ftc.diagnosis.detection.forces import NORMAL_INDEX, SIDE_INDEX, update_forces
 from beaver_ftc.diagnosis.detection.forces_design import configure_forces
-from beaver_ftc.diagnosis.detection.rows import INERTIAL, RAW, update_forces
+from beaver_ftc.diagnosis.detection.rows import INERTIAL, RAW
 from beaver_ftc.diagnosis.state import SIDE_FORCE
 from beaver_ftc.plant.instruments import MEASURED
 from beaver_ftc.scenario.diagnosis import Bounds
@@ -116,7 +113,7 @@ def test_a_surface_s_column_is_the_slope_along_it_and_its_errors_are_shares_of_t
 def test_the_flow_s_rates_are_those_of_a_body_that_moves_on():
     """The velocity through air at rest a moment later, by v' = a + g - x cross v."""
     record, a, phi, theta = felt()["statistical"]["forces"], np.array([0.5, 0.3, -9.5]), 0.2, 0.15
-    forces.fill_angle_rates(record, GRAVITY, measured())
+    flow_angles.fill_angle_rates(record, GRAVITY, measured())
     alpha, beta, V = Y[:3]
     v = V * np.array([np.cos(alpha) * np.cos(beta), np.sin(beta), np.sin(alpha) * np.cos(beta)])
     g = GRAVITY * np.array([-np.sin(theta), np.cos(theta) * np.sin(phi), np.cos(theta) * np.cos(phi)])
@@ -143,7 +140,7 @@ def test_noise_of_the_readings_is_jitter_of_the_forces():
     noise = fdi["statistical"]["rows"]["std"][:, SIDE_FORCE:]
     assert noise[RAW] == pytest.approx(np.std(drawn, axis=0), rel=0.06)
     without = noise[RAW] ** 2 - noise[INERTIAL] ** 2
-    slopes = record["component"]["vane"][:, 1] * np.radians([0.02, 0.03])
+    slopes = record["component"]["e_vane"] * np.radians([0.02, 0.03])
     assert without == pytest.approx(slopes**2, rel=1e-6)
 
 
@@ -154,7 +151,7 @@ def test_in_turbulence_gusts_turn_the_flow():
     )
     gained = moving["Q_e"] - still["Q_e"]
     sigma, L, V, dt, rng = 10.6 * 0.3048, 533.4, 46.0, 0.01, np.random.default_rng(2)
-    more = np.sqrt(gained) / np.abs(moving["vane"][:, 1])
+    more = np.sqrt(gained) / np.abs(moving["e_vane"])
     tau, n = L / V, 40_000  # (1 + sqrt(3) tau s) / (1 + tau s)^2, of white noise of intensity sigma^2 tau
     noise, one, two, gust = rng.normal(0.0, sigma * np.sqrt(tau / dt), n), 0.0, 0.0, np.empty(n)
     for k in range(n):
@@ -175,9 +172,9 @@ def test_without_vanes_the_flow_is_what_the_forces_say():
     ]
     off = Y + np.array([0.004, -0.003, 0.0, 0.0, 0.0])
     feel(fdi, measured(y=off, force=(0.5, *sound)))
-    forces.fill_vaneless_y(record, np.zeros(3), np.append(off, np.zeros(record["y_free"].size - 5)))
+    flow_angles.fill_vaneless_y(record, np.zeros(3), np.append(off, np.zeros(record["y_free"].size - 5)))
     assert record["y_free"][:5] == pytest.approx(Y, abs=6e-4), "an eighth of what they are off"
     still, turning = record["y_free"][:2].copy(), np.array([0.02, -0.03, 0.01])
-    forces.fill_vaneless_y(record, turning, np.append(off, np.zeros(record["y_free"].size - 5)))
-    damped = record["component"]["L"] @ turning / record["component"]["vane"][:, 1]
+    flow_angles.fill_vaneless_y(record, turning, np.append(off, np.zeros(record["y_free"].size - 5)))
+    damped = record["component"]["L"] @ turning / record["component"]["e_vane"]
     assert still - record["y_free"][:2] == pytest.approx(damped[::-1])

@@ -1,7 +1,7 @@
 """Projections on a direction, and the parity direction of each isolation estimator.
 
 m (3,)      direction of length 1 in roll, pitch and yaw; other files project on directions of other sizes
-v           vector, or a `size`, that is, bounds on the components of a vector
+v           vector; its `size`: bounds on the components of a vector
 G (3, n)    effect of each surface, rad/s2 per rad
 """
 
@@ -11,18 +11,21 @@ from beaver_ftc.compiled import kernel
 
 
 @kernel
-def project(m, v, size):
-    """m' v along a direction m; |m|' v if v is a `size`."""
+def project(m, v):
+    """m' v; m gives the number of components."""
     total = 0.0
     for j in range(m.size):
-        total += (abs(m[j]) if size else m[j]) * v[j]
+        total += m[j] * v[j]
     return total
 
 
 @kernel
-def along(v, m, i, size):
-    """Component i of a vector, or size, v (3,); for i = 3 its projection on a direction m (3,)."""
-    return v[i] if i < 3 else project(m, v, size)
+def project_size(m, size):
+    """|m|' size: the bound on m' v."""
+    total = 0.0
+    for j in range(m.size):
+        total += abs(m[j]) * size[j]
+    return total
 
 
 @kernel

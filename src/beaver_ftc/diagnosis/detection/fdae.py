@@ -113,7 +113,7 @@ def evaluate_network(net, alpha, beta):
     """fhat = W^T Phi, rad/s2, at the present alpha and beta."""
     fill_basis(alpha, beta, net.memory.Phi)
     for i in range(3):
-        net.output[i] = project(net.memory.weights[i], net.memory.Phi, False)
+        net.output[i] = project(net.memory.weights[i], net.memory.Phi)
 
 
 @kernel

@@ -14,7 +14,6 @@ Every filter has the exact bound of its own pole, so the alarm is the first of t
 alarms. A pole far above the frame rate (`DEADBEAT_PER_S`) tests the innovation itself, |nu| > nu_max; for a
 bound that holds instant by instant no filter, window or sum of innovations can alarm earlier (detection.md,
 "The guarantees"). Slower poles detect more if errors are correlated over frames, as measurement errors are.
-The reach of a fault is its possible effect on the filters since the start of the flight.
 
 Filter 0, the published one, is the residual of the FDAE (fdae.py) until the alarm.
 
@@ -26,9 +25,7 @@ Symbols of the kernels:
     E, T rad/s                residual of a filter and its threshold
     e rad/s                   the part of T that has a memory, T_eta + T_n
     n rad/s                   bound on the changing part of a gyro's error (`bounds.n_gyro`)
-    a, m, i                   decay per frame; number of a filter; axis, or 3: along the parity direction
-    fie; h, Z, r rad/s2       isolation estimator; its fault h + theta Z +- r (EFFECT_RECORD of estimators.py)
-    lo, hi                    ends of an interval: of theta, of a residual, of the acceleration by a fault
+    a, m, i                   decay per frame; number of a filter; axis
     bank, bound               records: BANK_RECORD, `bound_dtype`
 """
 
@@ -38,7 +35,6 @@ import numpy as np
 
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.compiled import kernel, record
-from beaver_ftc.diagnosis.detection.directions import along
 from beaver_ftc.diagnosis.state import STATISTICAL_DETECTOR, WORST_CASE_DETECTOR
 from beaver_ftc.scenario.declared import Declared, SensorErrors
 from beaver_ftc.scenario.diagnosis import MAX_POLES, FdiConfig
@@ -62,30 +58,6 @@ def advance_bound(e, eta, a, dt, n=0.0):
     gyro's error when the frame began.
     """
     return a * e + dt * eta + (1.0 - a) * n
-
-
-@kernel
-def residual_interval(lo, hi, R_pos, R_neg, Om, th, B):
-    """The interval (low, high), rad/s, that holds the residual of the true estimator.
-
-        lo R_pos + hi R_neg - Om th - B  <=  eps  <=  hi R_pos + lo R_neg - Om th + B
-
-    The parameter may move anywhere within [lo, hi] at every instant, so an incipient or intermittent fault is
-    covered. R_pos, R_neg, Om rad/s: filtered positive part, negative part (at most 0) and whole of Z; th:
-    estimate; B rad/s: bound on the filtered uncertainty.
-    """
-    eps_lo = lo * R_pos + hi * R_neg - Om * th - B
-    eps_hi = hi * R_pos + lo * R_neg - Om * th + B
-    return eps_lo, eps_hi
-
-
-@kernel
-def published_interval(lo, hi, Om, th, B):
-    """(-mu, mu), mu = k |Om| + B rad/s, k = max(th - lo, hi - th) bounds |theta - th| [Zhang2005, via
-    Zhang2002].
-    """
-    mu = max(th - lo, hi - th) * abs(Om) + B
-    return -mu, mu
 
 
 # The bank of detection filters; filter 0 is the published one. a: decays per frame; e rad/s: the part of the
@@ -210,53 +182,3 @@ def bank_share(bank):
     for i in range(3):
         largest = max(largest, filter_share(bank, nearest_filter(bank, i), i))
     return largest
-
-
-@kernel
-def fault_range(fie, i):
-    """(lo, hi), the least and greatest acceleration by the fault on axis i, or along its parity direction if
-    i = 3, rad/s2:
-
-        lo = min(0, h + theta_min Z, h + theta_max Z) - r
-        hi = max(0, h + theta_min Z, h + theta_max Z) + r
-
-    The 0 is for the frames before the fault.
-    """
-    phi, d = fie.effect, fie.parity_direction
-    h, Z = along(phi.h, d, i, False), along(phi.Z, d, i, False)
-    r = along(phi.r, d, i, True)
-    at_lo, at_hi = h + fie.theta_min * Z, h + fie.theta_max * Z
-    return min(0.0, at_lo, at_hi) - r, max(0.0, at_lo, at_hi) + r
-
-
-@kernel
-def advance_reach(bank, fie, dt):
-    """Advance the reach (L, U) of the fault in each filter since the flight began; axis 3: along its parity
-    direction.
-
-        L <- a L + dt lo      U <- a U + dt hi      lo, hi: of `fault_range`
-
-    L, U rad/s: reach_lo and reach_hi of the estimator, (MAX_POLES, 4).
-    """
-    for i in range(4):
-        lo, hi = fault_range(fie, i)
-        for m, a in enumerate(bank.config.a[: bank.config.n_filters]):
-            fie.reach_lo[m, i] = a * fie.reach_lo[m, i] + dt * lo
-            fie.reach_hi[m, i] = a * fie.reach_hi[m, i] + dt * hi
-
-
-@kernel
-def is_reachable(bank, fie, shared):
-    """True if L - T <= E <= U + T for each filter and each axis that the estimator does not skip.
-
-    shared: the axes share one parameter. Then the residual along the parity direction d, d' E with the
-    threshold |d|' T, must satisfy this as well.
-    """
-    for m in range(bank.config.n_filters):
-        for i in range(4):
-            E = along(bank.output.residual[m], fie.parity_direction, i, False)
-            T = along(bank.output.threshold[m], fie.parity_direction, i, True)
-            counts = not fie.skip[i] if i < 3 else shared
-            if counts and not fie.reach_lo[m, i] - T <= E <= fie.reach_hi[m, i] + T:
-                return False
-    return True

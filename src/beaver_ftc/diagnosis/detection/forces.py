@@ -1,4 +1,4 @@
-"""Innovations of the side force and the normal force from accelerometers, as an addition to the rates.
+"""The rows of the forces (rows.py): side force and normal force, from accelerometers.
 
 Elevator and flap both pitch the aircraft, so the rates alone do not separate their faults. Their forces do.
 The innovation of a force, i = Y (side) or Z (normal), is scaled as if the force acted at the chord c, m:
@@ -14,16 +14,18 @@ mass. Noise of the accelerometers is model noise; their declared bias and slope 
 The side force has a term in the rate of sideslip. It is worked out from the accelerometers. JSBSim uses the
 rate of the run before.
 
-forces_design.py fills the records from what a scenario declares.
+flow_angles.py has the flow angles without the vanes. forces_design.py fills the records from what a scenario
+declares.
 
-Letters of the kernels. i is the number of the force, f its record (FORCE_RECORD), k a term or an axis, s a
-surface. Forces are over m c, like e, and so in rad/s2.
+Letters of the kernels. Forces are over m c, like e, and so in rad/s2.
 
+    i, f, r        number of the force, its record (FORCE_RECORD), its row
+    k, s           term of the force; surface
     e, f_hat       innovation; force of the model
     per_C          qdyn S / m c: e of a coefficient of one
     G              e per rad of a surface
     L              force of the model per rad/s of the aircraft against the air, 1/s
-    angle, vane    flow angle from inertial motion, rad; of a vane's error, per rad: (acceleration, e)
+    e_vane         e per rad of a vane's error
 """
 
 from typing import NamedTuple
@@ -31,38 +33,39 @@ from typing import NamedTuple
 import numpy as np
 
 from beaver_ftc.aircraft import Aircraft, Term
-from beaver_ftc.aircraft.schema import MAX_SURFACES, MAX_TERMS_OF_ONE
-from beaver_ftc.compiled import copy, kernel, record
-from beaver_ftc.design.table import AIRSPEED, ALPHA, BETA, N_Y
+from beaver_ftc.aircraft.aircraft import FORCES
+from beaver_ftc.aircraft.schema import MAX_SURFACES
+from beaver_ftc.compiled import kernel, record
+from beaver_ftc.design.table import AIRSPEED, N_Y, QDYN, evaluate
 from beaver_ftc.diagnosis.detection.directions import project
+from beaver_ftc.diagnosis.detection.flow_angles import fill_angle_rates, update_inertial
+from beaver_ftc.diagnosis.detection.rows import INERTIAL, N_SOURCES
 from beaver_ftc.diagnosis.gusts import drop_accelerometers
-from beaver_ftc.diagnosis.state import PITCH, YAW
+from beaver_ftc.diagnosis.state import PITCH, SIDE_FORCE, YAW
 from beaver_ftc.scenario.sensors import ACCELEROMETERS
 
 
 class Force(NamedTuple):
-    """A force: its coefficient; the place in y and the name of the vane that measures its flow angle; the
-    axis about which that angle turns the aircraft; its accelerometer."""
+    """A force: its coefficient; the vane that measures its flow angle; the axis about which that angle turns
+    the aircraft; its accelerometer."""
 
     coefficient: str
-    vane: int
-    vane_name: str
+    vane: str
     axis: int
     accelerometer: str
 
 
 SIDE_INDEX, NORMAL_INDEX = range(2)  # numbers of the forces across the body, and normal to it
 MEASURED_FORCES = (
-    Force("CY", BETA, "beta", YAW, ACCELEROMETERS[1]),
-    Force("CZ", ALPHA, "alpha", PITCH, ACCELEROMETERS[2]),
+    Force("CY", "beta", YAW, ACCELEROMETERS[1]),
+    Force("CZ", "alpha", PITCH, ACCELEROMETERS[2]),
 )
 FORCE_NAMES = tuple(force.coefficient for force in MEASURED_FORCES)
-VANES = tuple(force.vane for force in MEASURED_FORCES)
-VANE_E = 1  # place of e in `vane` of FORCE_RECORD
+_SIDE_ROW = FORCES.index("CY")  # of the table of the forces
 # A force counts from its second update on: only then the rate of sideslip of the run before is known.
 MIN_UPDATES = 2
-# Columns of a force: its terms, the rate of sideslip, the bias of the accelerometer, the force as a whole.
-MAX_FORCE_REGRESSORS = MAX_TERMS_OF_ONE + 3
+# Largest time between the force and the flow of one instant in JSBSim; 0.001 s was measured.
+MAX_FORCE_LAG_S = 0.002
 
 FORCE_RECORD = record(
     innovation=float,  # e at the start of the elapsed frame
@@ -70,8 +73,7 @@ FORCE_RECORD = record(
     e_drift=float,  # e per rad/s of the drift of that angle
     Q_e=float,  # intensity of the drift of e at that angle by errors and gusts, (rad/s2)2/s
     G=MAX_SURFACES,  # e per rad of each surface, now
-    # effects of an error of the vane, per rad: vane: on the axis of the force, and on e; vane_roll: on roll
-    vane=2, vane_roll=float,
+    e_vane=float,  # in trim
     var_trim=2,  # variance of f_hat in trim by noise, with that of the vane and without it, (rad/s2)2
     L=3, f_hat=float,
     G_trim=MAX_SURFACES,  # bound on e by each surface, per rad, in trim with signals of at most 1
@@ -90,20 +92,9 @@ FORCES_RECORD = record(
 )  # fmt: skip
 
 
-@kernel
-def fill_vaneless_y(forces, w, y):
-    """Fill `y_free` with the readings y, but alpha and beta worked out from the forces.
-
-        y_free = y - (e / q_ratio + L' w) / e_vane      e_vane = vane[VANE_E]: e per rad of the vane's error
-
-    The equation is for the two vanes, with the force of each. w (3,) rad/s: rotation of the air in body axes.
-    The aircraft turns at x - w relative to the air, so e / q_ratio contains -L' w, which is no effect of the
-    angle.
-    """
-    copy(y, forces.y_free)
-    for i, f in enumerate(forces.component):
-        e_w = project(f.L, w, False)
-        forces.y_free[VANES[i]] -= (f.innovation / forces.q_ratio + e_w) / f.vane[VANE_E]
+def terms_of_force(aircraft: Aircraft, i: int) -> list[Term]:
+    """The terms of force i, in the order of their columns (`add_terms`)."""
+    return [term for term in aircraft.measurable_forces if term.coefficient == FORCE_NAMES[i]]
 
 
 @kernel
@@ -115,48 +106,106 @@ def drop_forces(forces, gust, vaneless, vaned):
 
 
 @kernel
-def update_inertial(forces, f, i, y, dt):
-    """Integrate the flow angle of a vane from inertial motion, and return the innovation of force i at it.
+def update_forces(rows, forces, gust, du, meas, u, dt):
+    """Update the rows of the forces at this instant, dt s after the last.
 
-        angle <- angle + dt angle_rate      e_drift <- e_drift + dt slope
-        returned: e - slope (vane - angle)
+        eta = q_ratio sum_s G_trim_s du_s + MAX_FORCE_LAG_S |f_hat'|
 
-    y (4 + signals,): readings; vane rad: that of the force's vane, at which the angle starts in the first
-    update; slope rad/s2 per rad: e of an error of the vane.
+    u (n,) rad: surfaces; du (n,) rad: bounds on their errors; f_hat' rad/s3: change of the force over dt, 0
+    at the first instant.
+
+    The order matters: the force uses the flow's rates of the instant before, so `fill_angle_rates` comes
+    last. At the first instant those are not known; the rates of this instant are used.
     """
-    vane = y[VANES[i]]
-    slope = f.vane[VANE_E] * forces.q_ratio
-    f.angle = f.angle + dt * forces.angle_rate[i] if forces.n_seen else vane
-    f.e_drift += dt * slope
-    return f.innovation - slope * (vane - f.angle)
+    if forces.n_seen == 0:
+        fill_angle_rates(forces, gust.config.gravity, meas)
+    evaluate(gust.memory.table, meas.x, meas.y)
+    forces.q_ratio = meas.y[QDYN] / forces.q_trim
+    for i, f in enumerate(forces.component):
+        r = SIDE_FORCE + i
+        f_prev = f.f_hat
+        predict_force(rows, forces, f, gust, i, meas, u)
+        e_inertial = update_inertial(forces, f, i, meas.y, dt)
+        rows.Z[rows.first[i] + f.n_Z, r] = f.e_drift
+        fill_innovation(rows, forces, f, r, e_inertial, meas.y[QDYN])
+        e_lag = MAX_FORCE_LAG_S * abs(f.f_hat - f_prev) / dt if forces.n_seen else 0.0
+        rows.eta[0, r] = rows.eta[1, r] = project(du, f.G_trim) * forces.q_ratio + e_lag
+    fill_angle_rates(forces, gust.config.gravity, meas)
+    forces.n_seen = min(forces.n_seen + 1, MIN_UPDATES)
 
 
 @kernel
-def fill_angle_rates(forces, g, meas):
-    """Fill `angle_rate` with beta' and alpha' in still air, rad/s.
+def fill_innovation(rows, forces, f, r, e_inertial, qdyn):
+    """Fill nu and std of row r, of the force f, for every source:
 
-        beta' = p sin(alpha) - r cos(alpha)
-                + (a_y cos(beta) - (a_x cos(alpha) + a_z sin(alpha)) sin(beta)) / V
-        alpha' = q - tan(beta) (p cos(alpha) + r sin(alpha))
-                 + (a_z cos(alpha) - a_x sin(alpha)) / (V cos(beta))
+        nu = e, or e_inertial at the angle from inertial motion, for INERTIAL
+        std^2 = var_trim q_ratio^2 + (f_hat q_noise / qdyn)^2 + var_acc
 
-    a (3,) m/s2: reading of the accelerometers plus gravity, of size g m/s2, in body axes; p, q, r rad/s:
-    rates; V m/s: airspeed.
+    var_trim: with the noise of the vane, but for INERTIAL, which reads no vane; q_noise, qdyn Pa: noise and
+    value of the dynamic pressure; var_acc: by the accelerometer.
     """
-    a = meas.force
-    V = meas.y[AIRSPEED]
-    beta = meas.y[BETA]
-    p, q, r = meas.x[0], meas.x[1], meas.x[2]
-    phi, th = meas.attitude[0], meas.attitude[1]
-    c, s = np.cos(meas.y[ALPHA]), np.sin(meas.y[ALPHA])
-    a_x = a[0] - g * np.sin(th)
-    a_y = a[1] + g * np.cos(th) * np.sin(phi)
-    a_z = a[2] + g * np.cos(th) * np.cos(phi)
-    rate = forces.angle_rate
-    rate[SIDE_INDEX] = p * s - r * c + (a_y * np.cos(beta) - (a_x * c + a_z * s) * np.sin(beta)) / V
-    rate[NORMAL_INDEX] = q - np.tan(beta) * (p * c + r * s) + (a_z * c - a_x * s) / (V * np.cos(beta))
+    by_q = f.f_hat * forces.q_noise / qdyn
+    for source in range(N_SOURCES):
+        inertial = source == INERTIAL
+        var = f.var_trim[int(inertial)] * forces.q_ratio**2 + by_q * by_q + f.var_acc
+        rows.nu[source, r] = e_inertial if inertial else f.innovation
+        rows.std[source, r] = np.sqrt(var)
 
 
-def terms_of_force(aircraft: Aircraft, i: int) -> list[Term]:
-    """The terms of force i, in the order of their columns (`rows.add_terms`)."""
-    return [term for term in aircraft.measurable_forces if term.coefficient == FORCE_NAMES[i]]
+@kernel
+def predict_force(rows, forces, f, gust, i, meas, u):
+    """Predict force i, whose record is f, and fill its innovation e and the effects of surfaces:
+
+        e = a / c - f_hat      Gu_s = G_s u_s,  G_s of the instant before; at the first instant: of this one
+
+    a m/s2: reading of the force's accelerometer; 1 / c is `c_inv`. The rows have the effects of the frame
+    before, as for the rates: the law reacts to the noise of a reading, which must not be in a signature too
+    (statistical.md, "Signature from the previous frame").
+    """
+    r = SIDE_FORCE + i
+    for s in range(u.size):
+        rows.G[s, r] = f.G[s]
+    f.f_hat = f_hat = add_terms(rows, forces, f, gust, i, meas, u)
+    rows.Z[rows.first[i] + f.n_Z - 1, r] = f_hat
+    for s in range(u.size):
+        if forces.n_seen == 0:
+            rows.G[s, r] = f.G[s]
+        rows.Gu[s, r] = rows.G[s, r] * u[s]
+    f.innovation = meas.force[1 + i] * forces.c_inv - f_hat
+
+
+@kernel
+def add_terms(rows, forces, f, gust, i, meas, u):
+    """Fill the columns of the terms of force i, and the effects G of surfaces with the bounds e_G on their
+    errors; return the predicted force f_hat, rad/s2.
+
+        f_hat = sum_k C_k Z_k      Z_k = per_C monomial_k [u_s]      per_C = qdyn S / m c
+        G_s = sum_k C_k per_C monomial_k      e_G_s = sum_k tol_k |per_C monomial_k|      k: terms in u_s
+
+    The column of term k is offset + k, so that the first term has the first column of the force. After the
+    terms of the side force comes that in the rate of sideslip, f_bdot, which is added to f_hat, too.
+    """
+    table = gust.memory.table
+    r = SIDE_FORCE + i
+    first = table.free_from[_SIDE_ROW + i]
+    end = table.surface_to[_SIDE_ROW + i]
+    offset = rows.first[i] - first
+    f_hat = 0.0
+    per_C = meas.y[QDYN] * gust.config.S_m * forces.c_inv
+    for s in range(u.size):
+        rows.e_G[s, r] = f.G[s] = 0.0
+    for k in range(first, end):
+        s = table.surface[k]
+        Z = per_C * table.power[table.monomial[k]]
+        if s >= 0:
+            f.G[s] += table.value[k] * Z
+            rows.e_G[s, r] += rows.tol[offset + k] * abs(Z)
+            Z *= u[s]
+        rows.Z[offset + k, r] = Z
+        f_hat += table.value[k] * Z
+    if i == SIDE_INDEX:
+        span_over_2V = gust.config.span / (2.0 * meas.y[AIRSPEED])
+        f_bdot = per_C * forces.CY_bdot * forces.angle_rate[SIDE_INDEX] * span_over_2V
+        rows.Z[offset + end, r] = f_bdot
+        f_hat += f_bdot
+    return f_hat

@@ -1,7 +1,6 @@
 """The records of the forces, as they follow from what a scenario declares.
 
-Letters as in forces.py. i: number of the force; f: its record; err: record of the declared errors
-(bounds.py); x, y, u of a `TrimState`: rates, readings and deflections in trim.
+Letters as in forces.py; x, y, u of a `TrimState`: rates, readings and deflections in trim.
 """
 
 import numpy as np
@@ -12,6 +11,7 @@ from beaver_ftc.aircraft.schema import MAX_SURFACES, SIDESLIP_RATE
 from beaver_ftc.compiled import fill
 from beaver_ftc.design.engine import slipstream_slopes
 from beaver_ftc.design.table import AIRSPEED, DPT, QDYN
+from beaver_ftc.diagnosis.detection.flow_angles import VANES
 from beaver_ftc.diagnosis.detection.forces import MEASURED_FORCES, NORMAL_INDEX, SIDE_INDEX, terms_of_force
 from beaver_ftc.diagnosis.monitors.residual_bounds import EARTH_M_S2
 from beaver_ftc.diagnosis.state import ROLL, SIDE_FORCE
@@ -32,94 +32,70 @@ def configure_forces(
 ) -> None:
     """Fill the record of the forces from what is declared.
 
-    slopes (3, y.size): of the angular accelerations with y, in trim. dt s a frame.
+        f_all = per_C dC / d(alpha, beta, V, p, q, r, dpt),      per_C = qdyn S / m c
+        Q_e = f_vane^2 (Q_angle + walk),      Q_angle = (DRIFT_CHANGE_PER_S drift)^2 + dt (std / V)^2
+
+    slopes (3, y.size): of the angular accelerations with y, in trim. dt s a frame. f_all (7,): slopes of the
+    predicted force, in the order of `_force_slopes`; f_vane rad/s2 per rad: that with the force's vane;
+    Q_angle rad2/s: intensity of the drift of the flow angle from inertial motion, its first part by the
+    change of the drift in 1 s, squared, in each second; drift rad/s: bound on that drift; walk rad2/s:
+    intensity of the change of that angle by gusts; std m/s2: noise of the accelerometer. G_trim takes the
+    signals of a term, besides the deflection, as 1.
     """
     stat = fdi["statistical"]
     err = fdi["bound"]["declared_errors"]
-    aircraft = declared.aircraft
     forces = stat["forces"]
+    cfg = stat["gust"]["config"]
+    aircraft = declared.aircraft
+    errors = declared.sensors
+    y = trim[1]
+    c_inv = 1.0 / aircraft.geometry.chord_m
+    per_C = y[QDYN] * cfg["S_m"] * c_inv
     CY_bdot = sum(
         declared.terms[term.name]
         for term in aircraft.forces
         if term.coefficient == "CY" and term.of == ((SIDESLIP_RATE, 1),)
     )
-    fill(
-        forces, c_inv=1.0 / aircraft.geometry.chord_m, q_trim=trim[1][QDYN],
-        CY_bdot=CY_bdot,
-        q_noise=declared.sensors["qdyn"].random,
-    )  # fmt: skip
-    for i in range(2):
-        _configure_force(stat, err, declared, trim, slopes, i, dt)
-
-
-def _configure_force(
-    stat: np.void, err: np.void, declared: Declared, trim: TrimState, slopes: np.ndarray, i: int, dt: float
-) -> None:
-    """Fill the record of force i; stat: of the detector, err: of the declared errors, other arguments as of
-    `configure_forces`.
-
-        f_all = per_C dC / d(alpha, beta, V, p, q, r, dpt),      per_C = qdyn S / m c
-        Q_e = f_vane^2 (Q_angle + walk),      Q_angle = (DRIFT_CHANGE_PER_S drift)^2 + dt (std / V)^2
-
-    f_all (7,): slopes of the predicted force, in the order of `_force_slopes`; f_vane rad/s2 per rad: that
-    with the force's vane; Q_angle rad2/s: intensity of the drift of the flow angle from inertial motion, its
-    first part by the change of the drift in 1 s, squared, in each second; drift rad/s: bound on that drift;
-    walk rad2/s: intensity of the change of that angle by gusts; std m/s2: noise of the accelerometer. G_trim
-    takes the signals of a term, besides the deflection, as 1.
-    """
-    y = trim[1]
-    aircraft = declared.aircraft
-    errors = declared.sensors
-    forces = stat["forces"]
-    cfg = stat["gust"]["config"]
-    f = forces["component"][i]
-    force = MEASURED_FORCES[i]
-    per_C = y[QDYN] * cfg["S_m"] * forces["c_inv"]
-    f_all = per_C * _force_slopes(declared, force.coefficient, trim)
-    f_y = f_all[:-1]
-    std = errors[force.accelerometer].random
-    drift = _drift_bound(errors, cfg["gravity"], y[AIRSPEED], i)
-    Q_angle = (DRIFT_CHANGE_PER_S * drift) ** 2 + dt * (std / y[AIRSPEED]) ** 2
-    fill(
-        f, vane=(-slopes[force.axis, force.vane], -f_y[force.vane]), vane_roll=-slopes[ROLL, force.vane],
-        L=f_y[3:], var_trim=_force_variances(err, errors, y, f_all, force.vane),
-        var_acc=(forces["c_inv"] * std) ** 2,
-        Q_e=f_y[force.vane] ** 2 * (Q_angle + declared.air.angle_walk(y[AIRSPEED])),
-    )  # fmt: skip
-    _configure_columns(stat, declared, y, f_y[force.vane] / per_C, drift, i)
-    for term in terms_of_force(aircraft, i):
-        if term.surface:
-            f["G_trim"][aircraft.surfaces.index(term.surface)] += per_C * abs(declared.terms[term.name])
+    fill(forces, c_inv=c_inv, q_trim=y[QDYN], q_noise=errors["qdyn"].random, CY_bdot=CY_bdot)
+    for i, (force, f) in enumerate(zip(MEASURED_FORCES, forces["component"], strict=True)):
+        f_all = per_C * _force_slopes(declared, force.coefficient, trim)
+        f_vane = f_all[VANES[i]]
+        std = errors[force.accelerometer].random
+        drift = _drift_bound(errors, cfg["gravity"], y[AIRSPEED], i)
+        Q_angle = (DRIFT_CHANGE_PER_S * drift) ** 2 + dt * (std / y[AIRSPEED]) ** 2
+        fill(
+            f, e_vane=-f_vane, L=f_all[3:6], var_trim=_force_variances(err, errors, y, f_all, VANES[i]),
+            var_acc=(c_inv * std) ** 2, Q_e=f_vane**2 * (Q_angle + declared.air.angle_walk(y[AIRSPEED])),
+        )  # fmt: skip
+        for term in terms_of_force(aircraft, i):
+            if term.surface:
+                f["G_trim"][aircraft.surfaces.index(term.surface)] += per_C * abs(declared.terms[term.name])
+        _configure_columns(stat["rows"], f, declared, y, f_vane / per_C, drift, i)
+        _configure_vane(stat["rows"], f, slopes, i)
 
 
 def _force_variances(
     err: np.void, errors: SensorErrors, y: np.ndarray, f_all: np.ndarray, vane: int
 ) -> tuple[float, float]:
     """Variance of a predicted force by the noise of all readings, (rad/s2)2; the same without its vane. Of
-    the dynamic pressure only the part through dpt counts here: `rows.fill_force_row` adds the rest.
+    the dynamic pressure only the part through dpt counts here: `forces.fill_innovation` adds the rest.
 
         sum_k (f_k sigma_k)^2 + f_dpt^2 var_dpt,      k: alpha, beta, V, p, q, r
 
-    f_all (7,): slopes of the force as of `_force_slopes`, that of dpt last. dpt moves with the airspeed: its
-    part dpt_V counts in f_V, the rest is var_dpt.
+    err: record of the declared errors; f_all (7,): slopes of the force as of `_force_slopes`, that of dpt
+    last. dpt moves with the airspeed, which counts in f_V; var_dpt is its variance by the noise of dynamic
+    pressure and power. Without declared errors of the engine's instruments dpt has neither.
     """
-    f_y = f_all[:-1].copy()
-    f_dpt = f_all[-1]
-    dpt_V, var_dpt = _slipstream_noise(y, err, errors)
-    f_y[AIRSPEED] += f_dpt * dpt_V
-    parts = (f_y * errors.each("random", ("alpha", "beta", "V", *AXES))) ** 2
-    var = parts.sum() + f_dpt**2 * var_dpt
+    f = f_all[:-1].copy()
+    var_dpt = 0.0
+    if err["engine"]:
+        dpt_V, dpt_q, dpt_kw = slipstream_slopes(y, err["kw1"])
+        f[AIRSPEED] += f_all[-1] * dpt_V
+        noise_kw = err["kw0"] / NOISE_LIMIT_SIGMA
+        var_dpt = float((dpt_q * errors["qdyn"].random) ** 2 + (dpt_kw * noise_kw) ** 2)
+    parts = (f * errors.each("random", ("alpha", "beta", "V", *AXES))) ** 2
+    var = parts.sum() + f_all[-1] ** 2 * var_dpt
     return var, var - parts[vane]
-
-
-def _slipstream_noise(y: np.ndarray, err: np.void, errors: SensorErrors) -> tuple[float, float]:
-    """Slope of dpt with the reading of the airspeed, s/m; variance of dpt by the noise of dynamic pressure
-    and power. Both are 0 if no errors of the engine's instruments are declared."""
-    if not err["engine"]:
-        return 0.0, 0.0
-    dpt_V, dpt_q, dpt_kw = slipstream_slopes(y, err["kw1"])
-    noise_kw = err["kw0"] / NOISE_LIMIT_SIGMA
-    return dpt_V, float((dpt_q * errors["qdyn"].random) ** 2 + (dpt_kw * noise_kw) ** 2)
 
 
 def _drift_bound(errors: SensorErrors, gravity: float, V: float, i: int) -> float:
@@ -141,13 +117,13 @@ def _drift_bound(errors: SensorErrors, gravity: float, V: float, i: int) -> floa
 
 
 def _configure_columns(
-    stat: np.void, declared: Declared, y: np.ndarray, C_vane: float, drift: float, i: int
+    rows: np.void, f: np.void, declared: Declared, y: np.ndarray, C_vane: float, drift: float, i: int
 ) -> None:
-    """Fill the tolerances of the columns of force i, and the effect G of an error of its vane, with e_G.
+    """Fill the tolerances of the columns of force i.
 
     C_vane: slope of the force's coefficient with the flow angle, 1/rad; drift rad/s: of `_drift_bound`.
 
-    The columns follow each other in Z from `first` on. rows.py fills all but the bias, which is constant:
+    The columns follow each other in Z from `first` on. forces.py fills all but the bias, which is constant:
 
         column            there                     tolerance                        Z filled by
         each term         always                    coefficients, vane, pressure     add_terms
@@ -156,12 +132,10 @@ def _configure_columns(
         whole force       always                    mass, slope of the sensor        predict_force, n_Z - 1
         drift             always                    rad/s                            update_forces, n_Z
     """
-    rows = stat["rows"]
-    f = stat["forces"]["component"][i]
     force = MEASURED_FORCES[i]
     tol_C = declared.coefficients.largest
     errors = declared.sensors
-    vane = errors[force.vane_name]
+    vane = errors[force.vane]
     acc = errors[force.accelerometer]
     tol_q = errors["qdyn"].steady / y[QDYN] + errors["qdyn"].slope
     tol = [
@@ -176,9 +150,15 @@ def _configure_columns(
         tol.append(acc.steady)
     tol += [MASS_TOLERANCE + acc.slope, drift]
     f["n_Z"], rows["tol"][first : first + len(tol)] = len(tol) - 1, tol
-    vane_effect = rows["G"][MAX_SURFACES + i]
-    vane_effect[[ROLL, force.axis, SIDE_FORCE + i]] = f["vane_roll"], *f["vane"]
-    rows["e_G"][MAX_SURFACES + i] = VANE_TOLERANCE * np.abs(vane_effect)
+
+
+def _configure_vane(rows: np.void, f: np.void, slopes: np.ndarray, i: int) -> None:
+    """Fill G and e_G of an error of the vane of force i: its effect on roll, on the axis of the force and on
+    the force, per rad, and the bound on the error of each. slopes: as of `configure_forces`."""
+    axis = MEASURED_FORCES[i].axis
+    G = rows["G"][MAX_SURFACES + i]
+    G[[ROLL, axis, SIDE_FORCE + i]] = -slopes[ROLL, VANES[i]], -slopes[axis, VANES[i]], f["e_vane"]
+    rows["e_G"][MAX_SURFACES + i] = VANE_TOLERANCE * np.abs(G)
 
 
 def _force_coefficient(declared: Declared, name: str, state: TrimState) -> float:

@@ -78,7 +78,6 @@ from beaver_ftc.diagnosis.state import LOSS
 PITCH_BLOCK, LATERAL_BLOCK, REVERTING_BLOCK = range(3)
 N_FILTER_BLOCKS = 3
 N_SLOTS = 10  # number of onsets that are tested of each hypothesis
-N_INPUT_READINGS = 5  # alpha, beta, airspeed, dynamic pressure, engine power: rows.py
 N_ROWS = 5  # roll, pitch, yaw, side force, normal force: rows.py
 USUAL_HYPOTHESES = 8  # number that is enough for a block of the rates of most aircraft
 MIN_ETA_RAD_S2 = 1e-3  # lower limit of the bound that sets the drift: the bound may pass zero

@@ -255,7 +255,7 @@ def changes_view(view, forces, s, G):
     of the frame before, so m' G of this frame is not exactly 0.
     """
     m = view.block.m[0]
-    effect = project(G, m, False)  # the three rates of m; project loops over its first argument
+    effect = project(G, m)  # the three rates of m; project loops over its first argument
     for i, f in enumerate(forces.component):
         effect += m[SIDE_FORCE + i] * f.G[s]
     return view.nulled != s and effect != 0.0

@@ -14,20 +14,26 @@ from beaver_ftc.compiled import fill
 from beaver_ftc.diagnosis.detection import likelihood
 from beaver_ftc.diagnosis.detection.forces import (
     FORCE_NAMES,
-    MAX_FORCE_REGRESSORS,
     NORMAL_INDEX,
     SIDE_INDEX,
     terms_of_force,
 )
 from beaver_ftc.diagnosis.detection.likelihood import (
     LATERAL_BLOCK,
-    N_INPUT_READINGS,
     PITCH_BLOCK,
     STEP_FAULT,
     BlockCapacity,
 )
 from beaver_ftc.diagnosis.detection.parity import AXIS_VIEW, VANE_VIEW, StatisticalSize
-from beaver_ftc.diagnosis.detection.rows import INERTIAL, RAW, VANED, VANELESS, set_columns
+from beaver_ftc.diagnosis.detection.rows import (
+    INERTIAL,
+    MAX_FORCE_REGRESSORS,
+    N_INPUT_READINGS,
+    RAW,
+    VANED,
+    VANELESS,
+    set_columns,
+)
 from beaver_ftc.diagnosis.state import LOSS, NORMAL_FORCE, PITCH, ROLL, SIDE_FORCE, YAW
 from beaver_ftc.diagnosis.tolerances import moment_axis
 

@@ -43,13 +43,8 @@ from beaver_ftc.diagnosis.detection.parity import (
     StatisticalSize,
     view_dtype,
 )
-from beaver_ftc.diagnosis.detection.rows import (
-    NOISE_RECORD,
-    ROWS_RECORD,
-    add_constants,
-    begin_rows,
-    project_rows,
-)
+from beaver_ftc.diagnosis.detection.rates import NOISE_RECORD, add_constants, begin_rows
+from beaver_ftc.diagnosis.detection.rows import ROWS_RECORD, project_rows
 from beaver_ftc.diagnosis.detection.tones import TONE_RECORD
 from beaver_ftc.diagnosis.detection.whitening import D0, add_turn_to_drift, whiten_calm, whiten_step
 from beaver_ftc.diagnosis.gust_drift import unmeasured_drift

@@ -1,6 +1,6 @@
 """The statistical detector as it follows from what a scenario declares: level, drift, blocks and views.
 
-The noise model (rows.py) has the declared noise, for which the declared rate of false alarms holds. Letters
+The noise model (rates.py) has the declared noise, for which the declared rate of false alarms holds. Letters
 as in statistical.py; omega, rad/s, is the frequency of a bounded uncertainty.
 """
 
@@ -34,7 +34,8 @@ from beaver_ftc.diagnosis.detection.parity_design import (
     configure_parity_views,
     list_directions,
 )
-from beaver_ftc.diagnosis.detection.rows import RATES, configure_rows, set_columns
+from beaver_ftc.diagnosis.detection.rates import configure_rows
+from beaver_ftc.diagnosis.detection.rows import RATES, set_columns
 from beaver_ftc.diagnosis.detection.statistical import MAX_ETA_RATE
 from beaver_ftc.diagnosis.detection.tones import N_TONES, configure_tones
 from beaver_ftc.diagnosis.gusts import MIN_UNMEASURED_SHARES
@@ -294,7 +295,7 @@ def _configure_noise(
 
         Q0 = sum_x (F_x sigma_x)^2      Q = Q0 + sum_y (F_y sigma_y)^2, in trim
 
-    In flight `rows.add_constants` updates Q, and adds the noise of the engine's power.
+    In flight `rates.add_constants` updates Q, and adds the noise of the engine's power.
 
     F_x, F_y: slopes of f + G u with rates x and air data y; sigma: noise of the readings, gyros first. Also
     fill G_trim, the magnitude of G in trim.

@@ -21,7 +21,8 @@ from beaver_ftc.design.model import unanticipated_pitch
 from beaver_ftc.design.table import AIRSPEED, ALPHA, BETA
 from beaver_ftc.diagnosis import conclusion, estimators, gusts, isolation
 from beaver_ftc.diagnosis.detection import attitude, fdae, filters, forces, parity, statistical
-from beaver_ftc.diagnosis.detection.rows import finish_rows, update_forces
+from beaver_ftc.diagnosis.detection.flow_angles import fill_vaneless_y
+from beaver_ftc.diagnosis.detection.rates import finish_rows
 from beaver_ftc.diagnosis.model_prediction import fill_old_effects, innovation_known
 from beaver_ftc.diagnosis.monitors import engine_monitor, gyro_or_attitude, sensor_monitor
 from beaver_ftc.diagnosis.state import (
@@ -241,9 +242,9 @@ def update_gusts(stat, du, pred, meas, k, dt):
     if force.in_use or gust.output.uses_accelerometers:
         gust.memory.f_read = meas.force
     if force.in_use:
-        update_forces(stat.rows, force, gust, du, meas, pred.u, dt)
+        forces.update_forces(stat.rows, force, gust, du, meas, pred.u, dt)
         if vaneless.output.gusty:
-            forces.fill_vaneless_y(force, vaneless.memory.w_body, meas.y)
+            fill_vaneless_y(force, vaneless.memory.w_body, meas.y)
             step_view_gust(vaneless, force.y_free, pred, meas, k, dt)
         if vaned.output.gusty:
             step_view_gust(vaned, meas.y, pred, meas, k, dt)

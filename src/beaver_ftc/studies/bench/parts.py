@@ -62,8 +62,8 @@ PARTS: dict[str, dict[str, Kernel]] = {
     "thresholds": {
         "diagnosis.bounds.add_published_bound": nothing,
         "diagnosis.detection.filters.advance_bound": unlimited,
-        "diagnosis.detection.filters.residual_interval": all_residuals,
-        "diagnosis.detection.filters.published_interval": all_residuals,
+        "diagnosis.detection.intervals.residual_interval": all_residuals,
+        "diagnosis.detection.intervals.published_interval": all_residuals,
     },
     # the network of the detection estimator, which learns after the alarm
     "network": {

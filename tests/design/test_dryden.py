@@ -4,14 +4,8 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from beaver_ftc.design import (
-    SCALE_M,
-    Dryden,
-    altitude_of,
-    rotation_lengths,
-    standard_air,
-    standard_density,
-)
+from beaver_ftc.design.atmosphere import altitude_of, standard_air, standard_density
+from beaver_ftc.design.turbulence import SCALE_M, Dryden, rotation_lengths
 
 
 @pytest.mark.parametrize("span_m", [2.09, 14.63])

@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from beaver_ftc.design import Dryden
+from beaver_ftc.design.turbulence import Dryden
 from beaver_ftc.diagnosis import gusts
 from beaver_ftc.loop.loop import Loop
 from flying import scenario

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.design import Dryden
+from beaver_ftc.design.turbulence import Dryden
 from beaver_ftc.diagnosis import bounds, bounds_design, gusts
 from beaver_ftc.diagnosis.bounds import errors_dtype
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.design import Dryden
+from beaver_ftc.design.turbulence import Dryden
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.true_aircraft import configure, take_off, trim_of
 from beaver_ftc.scenario.schema import Scenario

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from beaver_ftc.design import altitude_of, standard_density
+from beaver_ftc.design.atmosphere import altitude_of, standard_density
 from beaver_ftc.scenario.measured_range import (
     ALTITUDE,
     BETWEEN,

@@ -7,7 +7,8 @@ import numpy as np
 from beaver_ftc.aircraft import AXES, Term
 from beaver_ftc.aircraft.aircraft import MOMENTS
 from beaver_ftc.aircraft.schema import RATE_SIGNALS
-from beaver_ftc.design.model import InertiaCoefficients, coefficient_slopes, inertia_coefficients
+from beaver_ftc.design.model import InertiaCoefficients, inertia_coefficients
+from beaver_ftc.design.plain_model import coefficient_slopes
 from beaver_ftc.design.table import AIRSPEED, PH, RH
 from beaver_ftc.diagnosis.bounds_design import inertia_bounds
 from beaver_ftc.scenario.declared import Declared, SensorErrors

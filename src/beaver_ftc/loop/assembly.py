@@ -20,7 +20,7 @@ from beaver_ftc.control import state as control
 from beaver_ftc.control.accommodation import SUPERVISOR
 from beaver_ftc.control.autopilot_setup import AUTOPILOT, set_up_autopilot
 from beaver_ftc.control.profile import COLUMNS
-from beaver_ftc.design.model import anchor
+from beaver_ftc.design.plain_model import anchor
 from beaver_ftc.diagnosis import model_prediction, schemes
 from beaver_ftc.diagnosis.assessment import assessment_dtype
 from beaver_ftc.diagnosis.detection.parity import USUAL_SIZE, StatisticalSize

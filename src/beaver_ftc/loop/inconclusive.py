@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
-from beaver_ftc.design import altitude_of
+from beaver_ftc.design.atmosphere import altitude_of
 from beaver_ftc.scenario.measured_range import (
     ALTITUDE,
     BETWEEN,

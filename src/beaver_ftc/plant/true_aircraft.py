@@ -9,7 +9,7 @@ from math import radians
 
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.aircraft.aircraft import KG_PER_LB
-from beaver_ftc.design import EXCEEDENCE, WIND_AT_20_FT
+from beaver_ftc.design.turbulence import EXCEEDENCE, WIND_AT_20_FT
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.plant.adapter import FT_PER_M, Plant
 from beaver_ftc.plant.faults import NEVER

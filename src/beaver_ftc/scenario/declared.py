@@ -14,7 +14,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from beaver_ftc.aircraft import Aircraft, MassProperties, Term
-from beaver_ftc.design import Dryden
+from beaver_ftc.design.turbulence import Dryden
 from beaver_ftc.scenario.airframe import Actuators, Initial
 from beaver_ftc.scenario.builtin import KeptBySections
 from beaver_ftc.scenario.diagnosis import ActuatorBounds, ControlConfig, FdiConfig

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 from pydantic import AfterValidator, Field, Strict, field_validator, model_validator
 
 from beaver_ftc.aircraft import AXES
-from beaver_ftc.design import Severity
+from beaver_ftc.design.turbulence import Severity
 from beaver_ftc.documents.document import Conflict, Location, Section, deny, entry, number, refuse
 from beaver_ftc.documents.errors import suggestion
 from beaver_ftc.plugins import DETECTORS, LAWS, needs_leaders, refusal, wrong_options

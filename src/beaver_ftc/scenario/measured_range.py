@@ -9,7 +9,7 @@ from math import degrees, inf
 from typing import Any
 
 from beaver_ftc.aircraft import Aircraft
-from beaver_ftc.design import altitude_of
+from beaver_ftc.design.atmosphere import altitude_of
 
 Span = tuple[float, float]
 ALTITUDE = "altitude_m"

@@ -20,7 +20,7 @@ from beaver_ftc.control.laws.loop_design import margins
 from beaver_ftc.control.laws.rejecting import STAND_IN
 from beaver_ftc.control.readout import DefaultLaw
 from beaver_ftc.design.engine import DPT_0
-from beaver_ftc.design.model import jacobian
+from beaver_ftc.design.plain_model import jacobian
 from beaver_ftc.design.table import AIRSPEED, DPT, QDYN
 from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
 from beaver_ftc.documents.errors import BadInput

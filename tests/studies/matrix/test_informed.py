@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from beaver_ftc.aircraft import load
-from beaver_ftc.design.model import DesignFunctions, design_of, inertia_coefficients, inertial
+from beaver_ftc.design.model import DesignFunctions, design_of, inertia_coefficients
+from beaver_ftc.design.plain_model import inertial
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.log import Columns
 from beaver_ftc.scenario.declared import Declared

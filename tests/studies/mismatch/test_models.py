@@ -4,14 +4,8 @@ import numpy as np
 import pytest
 
 from beaver_ftc.design.fdc import MASS
-from beaver_ftc.design.model import (
-    acceleration_at,
-    anchor,
-    design_of,
-    inertia_coefficients,
-    inertial,
-    response,
-)
+from beaver_ftc.design.model import acceleration_at, design_of, inertia_coefficients, response
+from beaver_ftc.design.plain_model import anchor, inertial
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.studies.mismatch.sources import (
     earth_in_body,

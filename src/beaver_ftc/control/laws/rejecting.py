@@ -50,8 +50,8 @@ from beaver_ftc.control.laws.loop_design import Loop, corrections, fastest, lead
 from beaver_ftc.control.laws.reference import advance
 from beaver_ftc.control.laws.withdrawal import is_doubtful, is_replaced, withdraw
 from beaver_ftc.control.thrust import between
-from beaver_ftc.design.model import effectiveness as control_effectiveness
-from beaver_ftc.design.model import own_damping
+from beaver_ftc.design.plain_model import effectiveness as control_effectiveness
+from beaver_ftc.design.plain_model import own_damping
 from beaver_ftc.design.table import AIRSPEED, QDYN
 from beaver_ftc.diagnosis.model_prediction import DEFAULT_RATE_RAD_S, servo_data
 from beaver_ftc.diagnosis.state import PITCH

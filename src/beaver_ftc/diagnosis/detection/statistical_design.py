@@ -14,9 +14,9 @@ import numpy as np
 
 from beaver_ftc.aircraft import AXES, Aircraft
 from beaver_ftc.compiled import fill
-from beaver_ftc.design import rotation_lengths
-from beaver_ftc.design.model import jacobian
+from beaver_ftc.design.plain_model import jacobian
 from beaver_ftc.design.table import AIRSPEED, ALPHA, BETA, QDYN
+from beaver_ftc.design.turbulence import rotation_lengths
 from beaver_ftc.diagnosis.bounds import Y0
 from beaver_ftc.diagnosis.detection import likelihood
 from beaver_ftc.diagnosis.detection.attitude import configure_attitude

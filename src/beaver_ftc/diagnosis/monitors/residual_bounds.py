@@ -13,7 +13,7 @@ docs/explanation/instruments.md (Bounds of the sensor monitor). Letters as in re
 import numpy as np
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.design import LEAST_HEIGHT_M
+from beaver_ftc.design.turbulence import LEAST_HEIGHT_M
 from beaver_ftc.diagnosis.bounds import largest_error
 from beaver_ftc.diagnosis.monitors.numbering import (
     ALPHA_TEST,

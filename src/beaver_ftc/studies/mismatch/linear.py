@@ -14,7 +14,8 @@ import numpy as np
 
 from beaver_ftc.design import fdc
 from beaver_ftc.design.engine import engine_power_kw, slipstream
-from beaver_ftc.design.model import design_of, jacobian
+from beaver_ftc.design.model import design_of
+from beaver_ftc.design.plain_model import jacobian
 from beaver_ftc.design.table import AIRSPEED, ALPHA
 from beaver_ftc.documents.files import Document
 from beaver_ftc.plant.adapter import FlightState

@@ -49,15 +49,13 @@ from beaver_ftc.design.fdc import SURFACES
 from beaver_ftc.design.model import (
     InertiaCoefficients,
     acceleration_at,
-    anchor,
     design_of,
     design_record,
     inertia_coefficients,
     inertia_of,
-    inertial,
     responses_at,
-    unanticipated_at,
 )
+from beaver_ftc.design.plain_model import anchor, inertial, unanticipated_at
 from beaver_ftc.plant.adapter import START_LATITUDE_DEG
 from beaver_ftc.plant.conditions import known_trim
 from beaver_ftc.scenario.declared import Declared

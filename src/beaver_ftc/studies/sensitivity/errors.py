@@ -15,7 +15,7 @@ import numpy as np
 from numpy.random import Generator
 
 from beaver_ftc.aircraft import AXES
-from beaver_ftc.design import SEVERITIES
+from beaver_ftc.design.turbulence import SEVERITIES
 from beaver_ftc.documents.document import Section
 from beaver_ftc.results.model import Document
 from beaver_ftc.scenario.airframe import TrueActuator, air_of

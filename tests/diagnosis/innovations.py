@@ -11,13 +11,15 @@ from scipy.signal import lfilter
 
 from beaver_ftc.compiled import copy, kernel
 from beaver_ftc.diagnosis.detection import likelihood, whitening
-from beaver_ftc.diagnosis.detection.likelihood import (
+from beaver_ftc.diagnosis.detection.blocks import (
     N_GROUP_TESTS,
     N_SLOTS,
     SIGN_OF_KIND,
     USUAL_HYPOTHESES,
     BlockCapacity,
     block_dtype,
+    reset_slot,
+    restarting_slot,
 )
 
 
@@ -40,7 +42,7 @@ def with_hypotheses(block, *kinds, tolerance=()):
     for h, kind in enumerate(kinds):
         block["hypothesis"][h]["kind"] = kind
         group, lane = divmod(h * N_SLOTS, N_GROUP_TESTS)
-        block["tests"]["supporting_correlation_sign"][group, lane : lane + N_SLOTS] = SIGN_OF_KIND[kind]
+        block["tests"]["sign"][group, lane : lane + N_SLOTS] = SIGN_OF_KIND[kind]
     return block
 
 
@@ -111,7 +113,7 @@ def weigh_all(block, innovations, signatures, regressors, dt):
     """Show a block innovations (k, n), signatures (k, h, n) and regressors (k, j, n), as a flight does."""
     n, n_h, n_Z = int(block["n"]), int(block["n_h"]), int(block["n_Z"])
     for k in range(len(innovations)):
-        likelihood.reset_slot(block, likelihood.restarting_slot(k))
+        reset_slot(block, restarting_slot(k))
         block["nu"][:n] = innovations[k]
         block["regressor"][:n_Z, :n] = regressors[k]
         block["hypothesis"]["signature"][:n_h, :n] = signatures[k]

@@ -32,10 +32,10 @@ import numpy as np
 
 from beaver_ftc.aircraft.schema import MAX_LEVELS
 from beaver_ftc.compiled import copy, kernel, record, sized
-from beaver_ftc.design.turbulence import LEAST_HEIGHT_M
 from beaver_ftc.design.engine import DPT_0, KW_TO_DPT, density_ratio
 from beaver_ftc.design.model import acceleration, design_dtype, nonlinear_response_from_table
 from beaver_ftc.design.table import AIRSPEED, DPT, N_Y, QDYN, evaluate
+from beaver_ftc.design.turbulence import LEAST_HEIGHT_M
 from beaver_ftc.diagnosis.error_map import look_up_map, map_dtype
 
 Y0 = 3  # gyros come first among the signals, then alpha, beta, airspeed, dynamic pressure

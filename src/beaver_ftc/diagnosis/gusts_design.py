@@ -10,9 +10,9 @@ import numpy as np
 
 from beaver_ftc.aircraft.aircraft import EARTH_RATE_RAD_S, FORCES, GRAVITY_MPS2
 from beaver_ftc.compiled import fill
-from beaver_ftc.design.turbulence import SCALE_M, rotation_lengths
 from beaver_ftc.design.plain_model import jacobian
 from beaver_ftc.design.table import AIRSPEED, fill_table
+from beaver_ftc.design.turbulence import SCALE_M, rotation_lengths
 from beaver_ftc.diagnosis.gusts import MIN_UNMEASURED_SHARES
 from beaver_ftc.diagnosis.monitors.residual_bounds import EARTH_M_S2
 from beaver_ftc.scenario.declared import MASS_TOLERANCE, Declared, SensorErrors

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, TypeVar, get_type_hints
 
 import numpy as np
 
-from beaver_ftc.diagnosis.detection.likelihood import N_SLOTS
+from beaver_ftc.diagnosis.detection.blocks import N_SLOTS
 from beaver_ftc.diagnosis.state import scheme_number
 
 Read = TypeVar("Read")
@@ -120,7 +120,7 @@ class GustReadout(NamedTuple):
 class StatisticalHypothesis(NamedTuple):
     """A fault that the statistical test compares with health.
 
-    hypothesis_kind    LOSS, or a kind of likelihood.py
+    hypothesis_kind    LOSS, or a kind of blocks.py
     surface, axis      numbers of its surface, or -1, and of its axis
     may_raise_alarm    whether its score counts for the alarm
     score_in_std       largest normalised evidence over all onsets, standard deviations, as the alarm level
@@ -401,10 +401,7 @@ def _read_block(blk: np.void) -> StatisticalBlock:
         for hyp in blk["hypothesis"][: blk["n_h"]]
     )
     n = len(hypotheses)
-    tests = (
-        blk["tests"][name].reshape(-1, N_SLOTS)[:n].copy()
-        for name in ("score", "supporting_correlation_sign", "N_p", "correlation_from_coarse_gust")
-    )
+    tests = (blk["tests"][name].reshape(-1, N_SLOTS)[:n].copy() for name in ("score", "sign", "N_p", "N_c"))
     return StatisticalBlock(
         tuple(blk["axes"][: blk["n"]].tolist()),
         float(blk["drift_correlation_length_m"]), float(blk["Q_scale"]),

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from innovations import block_of, bounded_all, by_onset, covariance, drawn, weigh_all, with_hypotheses
 
 from beaver_ftc.diagnosis.detection import likelihood, whitening
-from beaver_ftc.diagnosis.detection.likelihood import N_SLOTS, STEP_FAULT
+from beaver_ftc.diagnosis.detection.blocks import N_SLOTS, STEP_FAULT, reset_slot, restarting_slot
 from beaver_ftc.diagnosis.state import LOSS
 from samples import samples
 
@@ -109,7 +109,7 @@ def _largest_share(block, innovations, moments):
     """Largest evidence for a loss, in standard deviations, innovations and moments (k,) rad/s2."""
     block["alarm_level"], most = 0.0, 0.0
     for k, (nu, moment) in enumerate(zip(innovations, moments, strict=True)):
-        likelihood.reset_slot(block, likelihood.restarting_slot(k))
+        reset_slot(block, restarting_slot(k))
         block["nu"][0], block["hypothesis"][0]["signature"][0] = nu, moment
         if block["calm"]["n"]:
             whitening.whiten_calm(block, FRAME_S)

@@ -6,8 +6,8 @@ from innovations import drawn
 
 from beaver_ftc.aircraft import AXES, load
 from beaver_ftc.compiled import copy, kernel
-from beaver_ftc.diagnosis.detection import likelihood, statistical, statistical_design
-from beaver_ftc.diagnosis.detection.likelihood import N_SLOTS
+from beaver_ftc.diagnosis.detection import statistical, statistical_design
+from beaver_ftc.diagnosis.detection.blocks import DRIFT_PRIOR_RAD_S2, N_SLOTS, reset_slot
 from beaver_ftc.diagnosis.detection.rows import RATES
 from beaver_ftc.loop.assembly import configure_design
 from beaver_ftc.plant.instruments import MEASURED
@@ -54,9 +54,7 @@ class Detector:
         """Healthy ones (frames, 3), as declared."""
         out = np.empty((frames, 3))
         for block in self.blocks:  # of the two views of roll and yaw the latter, if it is there
-            out[:, block["axes"][: block["n"]]] = drawn(
-                block, frames, self.dt, rng, likelihood.DRIFT_PRIOR_RAD_S2
-            )
+            out[:, block["axes"][: block["n"]]] = drawn(block, frames, self.dt, rng, DRIFT_PRIOR_RAD_S2)
         return out
 
     def watch(self, innovations, Gu, cubic, renew=False):
@@ -77,13 +75,12 @@ def watch_all(detector, innovations, Gu, cubic, first, renew, dt, scores):
             rows.nu[RATES, i] = innovations[k, i]
             copy(Gu[k, i], rows.Gu[:4, i])
         statistical.update_blocks(detector, dt, first + k, 0)
-        views = detector.views[: detector.n_views]
-        statistical.update_alarm(detector, views, (first + k) * dt)
+        statistical.update_alarm(detector, (first + k) * dt)
         scores[k] = alarm.ratio
         if renew and alarm.ratio > 1.0:
             for slot in range(N_SLOTS):
                 for b in range(detector.block.size):
-                    likelihood.reset_slot(blocks[b], slot)
+                    reset_slot(blocks[b], slot)
 
 
 def surfaces_at_work(frames, rate_hz, rng, size=0.3):

@@ -4,7 +4,7 @@ import numpy as np
 
 from beaver_ftc.aircraft import aircraft
 from beaver_ftc.diagnosis import bounds, bounds_design, error_map
-from beaver_ftc.diagnosis.detection import filters, likelihood, statistical, statistical_design, tones
+from beaver_ftc.diagnosis.detection import block_design, blocks, filters, likelihood, statistical, tones
 from beaver_ftc.diagnosis.monitors import numbering, residual_bounds
 from beaver_ftc.plant import instruments
 from beaver_ftc.studies.present.tables import markdown_table
@@ -28,7 +28,7 @@ CONSTANTS = (  # (section, meaning, module, name there, unit)
         "rad/s²",
     ),
     (3, "design delays of the slower filters", filters, "POLE_DELAYS_S", "s"),
-    (7, "number of onsets tested together", likelihood, "N_SLOTS", ""),
+    (7, "number of onsets tested together", blocks, "N_SLOTS", ""),
     (
         7,
         "overshoot of the largest effect of model error",
@@ -39,11 +39,11 @@ CONSTANTS = (  # (section, meaning, module, name there, unit)
     (
         7,
         "share of the alarm level for noise, with model error",
-        statistical_design,
+        block_design,
         "LEVEL_NOISE_SHARE",
         "",
     ),
-    (7, "growth rate in the signature of a growing loss", statistical_design, "KAPPA_PER_S", "1/s"),
+    (7, "growth rate in the signature of a growing loss", block_design, "KAPPA_PER_S", "1/s"),
     (
         7,
         "log-likelihood ratio of an excluded loss, share of the largest",

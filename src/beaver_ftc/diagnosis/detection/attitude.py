@@ -59,13 +59,13 @@ import numpy as np
 
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.compiled import copy, fill, kernel, record, sized
-from beaver_ftc.diagnosis.detection.filters import leak
-from beaver_ftc.diagnosis.detection.likelihood import (
+from beaver_ftc.diagnosis.detection.blocks import (
     DRIFT_PRIOR_RAD_S2,
     LATERAL_BLOCK,
     PITCH_BLOCK,
     BlockCapacity,
 )
+from beaver_ftc.diagnosis.detection.filters import leak
 from beaver_ftc.diagnosis.state import LOSS
 from beaver_ftc.scenario.declared import SensorErrors
 

@@ -35,8 +35,7 @@ A gust may be visible to the vanes only roughly, if no force separates it from t
 (gusts.py). It correlates with the surfaces of a law that uses the vanes. Its response is whitened likewise,
 and the evidence that it contributes is subtracted.
 
-Onsets: slot j restarts every 2^(j+1) frames (the last one every 2^j), so that onsets of about every age exist
-at any time. After an alarm no slot restarts, and old evidence decays slowly.
+blocks.py has the records, and the onsets that are tested.
 
 Letters of the kernels, in addition to those of whitening.py. i is an axis, j a regressor, k an onset test,
 h a hypothesis, t a group of onset tests.
@@ -57,158 +56,23 @@ statistical.md writes nu~_chi for g_s, chi for s, N_j for R_j, room for the shar
 the alarm level.
 """
 
-from collections.abc import Sequence
 from math import sqrt
-from typing import NamedTuple
 
-import numpy as np
-
-from beaver_ftc.compiled import kernel, plain, record, sized
-from beaver_ftc.diagnosis.detection.whitening import (
-    D0,
-    FILTER_FIELDS,
-    advance_covariance,
-    update_calm_part,
-    whiten_step,
+from beaver_ftc.compiled import kernel
+from beaver_ftc.diagnosis.detection.blocks import (
+    GROUP_SIZE,
+    GROWING_LOSS,
+    LOSS_END,
+    N_SLOTS,
+    n_test_groups,
+    tests_in_group,
 )
+from beaver_ftc.diagnosis.detection.whitening import D0, advance_covariance, update_calm_part, whiten_step
 from beaver_ftc.diagnosis.state import LOSS
 
-# A block is a set of axes with correlated noise: pitch, roll with yaw, and roll with yaw again, with a drift
-# that returns to zero.
-PITCH_BLOCK, LATERAL_BLOCK, REVERTING_BLOCK = range(3)
-N_FILTER_BLOCKS = 3
-N_SLOTS = 10  # number of onsets that are tested of each hypothesis
-N_ROWS = 5  # roll, pitch, yaw, side force, normal force: rows.py
-USUAL_HYPOTHESES = 8  # number that is enough for a block of the rates of most aircraft
-MIN_ETA_RAD_S2 = 1e-3  # lower limit of the bound that sets the drift: the bound may pass zero
-# Kinds of hypothesis, in addition to LOSS and POSITION_HYPOTHESIS of state.py, 0 and 1
-STEP_FAULT, ALPHA_CUBED_MOMENT, GROWING_LOSS, LOSS_END = 2, 3, 4, 5
-# Sign of N that supports a hypothesis: a loss removes moment, its end restores moment; 0: both signs.
-SIGN_OF_KIND = {LOSS: -1.0, STEP_FAULT: 0.0, ALPHA_CUBED_MOMENT: 0.0, GROWING_LOSS: -1.0, LOSS_END: 1.0}
-
-DRIFT_PRIOR_RAD_S2 = 1.0  # standard deviation of the drift at the start of a flight; soon irrelevant
 LOSS_PRIOR = 12.0  # one over the variance of a loss that is uniform on [0, 1]
 # The magnitudes of a second-order transient of damping 0.7 sum to 1.09 times its sum; on two axes to more.
 RINGING_FACTOR = 1.2
-
-HYPOTHESIS_RECORD = record(
-    # alarms: whether it raises alarms; column: of its score in ALARM_RECORD.share (statistical.py)
-    kind=int, surface=int, axis=int, alarms=int, column=int,
-    signature=2,  # s of this frame, rad/s2 per unit of theta
-    decay=float,  # exp(-kappa dt) of a growing loss
-    score=float,  # largest normalised evidence over the onsets, standard deviations
-    th=float, D=float,  # estimate at the likeliest onset; one over its variance
-    llr_lo=float, llr_hi=float,  # bounds on the log-likelihood ratio against no fault
-)  # fmt: skip
-
-
-class BlockCapacity(NamedTuple):
-    """The numbers of regressors and hypotheses for which a block has memory."""
-
-    max_regressors: int
-    max_hypotheses: int
-
-
-# An onset test is one hypothesis with one onset. Those of a few hypotheses lie side by side for vector
-# instructions: test (h % GROUP_SIZE) * N_SLOTS + slot in group h // GROUP_SIZE. A group has the same size in
-# every record, so compiled code knows that its arrays do not overlap. Checking that in each frame took a
-# tenth of the detector's time.
-GROUP_SIZE = 4
-N_GROUP_TESTS = GROUP_SIZE * N_SLOTS
-TESTS_RECORD = record(
-    supporting_correlation_sign=N_GROUP_TESTS,  # sign of N that supports the hypothesis, or 0
-    # signature since the onset, rad/s2; state of its filter; its response in this frame, rad/s
-    s=(2, N_GROUP_TESTS), x_s=(4, N_GROUP_TESTS), g_s=(2, N_GROUP_TESTS),
-    w=(2, N_GROUP_TESTS), correlation=N_GROUP_TESTS, information=N_GROUP_TESTS,  # w; N; D
-    e_R=N_GROUP_TESTS,
-    left=N_GROUP_TESTS,  # exp(-kappa t) of a growing loss; for an end of a loss 1, and 0 after the onset
-    e_0=N_GROUP_TESTS, e_tv=N_GROUP_TESTS, e_w=N_GROUP_TESTS,
-    N_p=N_GROUP_TESTS, correlation_from_coarse_gust=N_GROUP_TESTS,  # N_p; N_c
-    score=N_GROUP_TESTS, llr_lo=N_GROUP_TESTS, llr_hi=N_GROUP_TESTS,
-    llr=N_GROUP_TESTS,  # log-likelihood ratio against no fault, -1 without information
-)  # fmt: skip
-
-
-def set_signs(b: np.void, kinds: Sequence[int]) -> None:
-    """Fill the sign of N that supports each hypothesis of a block, in all of its onset tests."""
-    signs = np.zeros(GROUP_SIZE * len(b["tests"]))
-    signs[: len(kinds)] = [SIGN_OF_KIND[kind] for kind in kinds]
-    b["tests"]["supporting_correlation_sign"] = signs.repeat(N_SLOTS).reshape(-1, N_GROUP_TESTS)
-
-
-@sized
-def block_dtype(size: BlockCapacity) -> np.dtype:
-    """A block: its axes, its whitening filter, its regressors, its hypotheses and their onset tests."""
-    n_groups = plain(n_test_groups)(size.max_hypotheses)
-    return record(
-        axes=(int, 2),  # first: a record that begins as another does is taken for one
-        **FILTER_FIELDS,
-        # source of the rows that it sees (rows.py), and its directions m; bound on the uncertainty along
-        # these, rad/s2, and whether that bound is for one surface anywhere in its travel
-        source=int, m=(2, N_ROWS), eta=2, any_position=int,
-        # correlation length of the drift, m, 0 for a random walk; factor on the intensity of a gust
-        drift_correlation_length_m=float, Q_scale=float,
-        x_known=4, nu=2,  # state of the filter after known faults
-        # in turbulence: filter without gust; lambda p, rad/s, and the sums pg, pp (`update_calm_part`)
-        calm=record(**FILTER_FIELDS), p=2, pg=float, pp=float,
-        has_coarse=int, g_c=2, x_c=4,  # whether vanes show a gust coarsely; state of its filter
-        # alarm level, standard deviations; share of it reserved for noise beyond a bounded uncertainty
-        alarm_level=float, noise_share=float, eta_rate=float, eta_0=2, eta_r=2,
-        # regressors: number in use, columns of Z in rows.py, tolerances; values, states and responses
-        n_Z=int, columns=(int, size.max_regressors), tol=size.max_regressors,
-        regressor=(size.max_regressors, 2), x_Z=(size.max_regressors, 4), g_Z=(size.max_regressors, 2),
-        n_h=int, hypothesis=(HYPOTHESIS_RECORD, size.max_hypotheses),
-        tests=(TESTS_RECORD, n_groups),
-        R=(n_groups, size.max_regressors, N_GROUP_TESTS),
-    )  # fmt: skip
-
-
-def new_filter_block(P: np.ndarray, R: np.ndarray) -> np.ndarray:
-    """A block (1,) that filters n rates and has no hypotheses.
-
-    P (2 n, 2 n): covariance of rates and their drift; R (n,): variance of a reading's noise. The decay a of
-    the drift is left 0, for the caller to fill.
-    """
-    blocks = np.zeros(1, block_dtype(BlockCapacity(1, 1)))
-    n = len(R)
-    b, x, d = blocks[0], slice(0, n), slice(n, 2 * n)
-    b["n"], b["axes"], b["R_y"][:n] = n, (0, 1), R
-    for name, i, j in (("P_xx", x, x), ("P_xd", x, d), ("P_dd", d, d)):
-        b[name][:n, :n] = P[i, j]
-    return blocks
-
-
-@kernel
-def restarting_slot(k):
-    """The slot that restarts at frame k: slot j at odd multiples of 2^j, the last at all other frames."""
-    j = 0
-    while k % 2 == 0 and j < N_SLOTS - 1:
-        k //= 2
-        j += 1
-    return j
-
-
-@kernel
-def tests_in_group(b, i):
-    """The number of onset tests in use in group i: the first entries of each array."""
-    return min(b.n_h - i * GROUP_SIZE, GROUP_SIZE) * N_SLOTS
-
-
-@kernel
-def n_test_groups(n_h):
-    """The number of groups of onset tests that n_h hypotheses need."""
-    return (n_h + (GROUP_SIZE - 1)) // GROUP_SIZE
-
-
-@kernel
-def reset_slot(b, slot):
-    """Restart a slot of every hypothesis: its onset is the frame that is added next, its evidence zero."""
-    for group in range(n_test_groups(b.n_h)):
-        t = b.tests[group]
-        for k in range(slot, tests_in_group(b, group), N_SLOTS):
-            t.left[k] = 1.0
-            t.correlation[k] = t.information[k] = t.N_p[k] = t.correlation_from_coarse_gust[k] = 0.0
-            t.e_0[k] = t.e_tv[k] = t.e_w[k] = t.w[:, k] = t.x_s[:, k] = b.R[group, : b.n_Z, k] = 0.0
 
 
 @kernel
@@ -262,14 +126,13 @@ def accumulate_tests(b, t, n, dt, decay):
         e_0 <- decay e_0 + eta_0' |w|              e_tv <- decay e_tv + eta_r' |w - w_before|
         e_w <- decay e_w + eta_rate eta_r' |w|
 
-    Letters as at the top; N_c is `correlation_from_coarse_gust`. g_s follows `whiten_step` with v = s, which
+    Letters as at the top. g_s follows `whiten_step` with v = s, which
     is written out for vectors of tests. In a block of one axis all values of a second axis are zero.
     """
     x = t.x_s
     g_s = t.g_s
     w = t.w
     a = b.a
-    N_c = t.correlation_from_coarse_gust
     for i in range(b.n):
         for k in range(n):
             g_s[i, k] = x[i, k] + dt * (t.s[i, k] - x[D0 + i, k])
@@ -292,10 +155,10 @@ def accumulate_tests(b, t, n, dt, decay):
         r_w = b.eta_rate * b.eta_r[i]
         for k in range(n):
             w_i = S_0 * g_s[0, k] + S_1 * g_s[1, k]
-            t.correlation[k] = keep * t.correlation[k] + w_i * g
-            t.information[k] = keep * t.information[k] + w_i * g_s[i, k]
+            t.N[k] = keep * t.N[k] + w_i * g
+            t.D[k] = keep * t.D[k] + w_i * g_s[i, k]
             t.N_p[k] = keep * t.N_p[k] + w_i * p
-            N_c[k] = keep * N_c[k] + w_i * g_c
+            t.N_c[k] = keep * t.N_c[k] + w_i * g_c
             t.e_0[k] = keep * t.e_0[k] + c * abs(w_i)
             t.e_tv[k] = keep * t.e_tv[k] + r * abs(w_i - w[i, k])
             t.e_w[k] = keep * t.e_w[k] + r_w * abs(w_i)
@@ -399,11 +262,11 @@ def evaluate_tests(b, t, n, without_eta, mapped):
     r0 = b.eta_r[0]
     r1 = b.eta_r[1]
     for k in range(n):
-        N, D, sign = t.correlation[k], t.information[k], t.supporting_correlation_sign[k]
+        N, D, sign = t.N[k], t.D[k], t.sign[k]
         signed = sign != 0.0
         known = D > 0.0
         N_s = sign * N if signed else abs(N)
-        e = t.e_R[k] + max(sign * t.N_p[k], 0.0) + max(sign * t.correlation_from_coarse_gust[k], 0.0)
+        e = t.e_R[k] + max(sign * t.N_p[k], 0.0) + max(sign * t.N_c[k], 0.0)
         room = uncertain_share(t, k, r0, r1)
         score = evidence_ratio(z, share, N_s - e, room, D)
         e += 0.0 if without_eta and (signed or not mapped) else room
@@ -437,7 +300,7 @@ def evaluate_hypotheses(b, decay, mapped):
             if t.llr[k] > t.llr[k_best]:
                 k_best = k
         if t.llr[k_best] > -1.0:
-            N, hyp.D = t.correlation[k_best], t.information[k_best]
+            N, hyp.D = t.N[k_best], t.D[k_best]
             hyp.th = estimate_theta(hyp.kind, N, hyp.D)
 
 

@@ -1,37 +1,35 @@
 """Parity tests: they exclude a surface for any type and time history of its fault.
 
-A fault of surface s accelerates the aircraft along the column g_s of G only, rad/s2 per rad. A projection of
-the innovation nu, rad/s2, on a parity direction m that is orthogonal to that column,
+A fault of surface s accelerates the aircraft along the column g = G_s only, rad/s2 per rad. The projection of
+the innovation nu, rad/s2, on a parity direction m that is orthogonal to this column,
 
-    m . nu        with  m . g_s = 0,  |m| = 1
+    m' nu        with  m' g = 0,  |m| = 1
 
 does not depend on a fault of s. If a test finds a signal in this projection, s is not the (only) cause. Each
-direction is a view: it has a whitening filter of its own and tests for a step, for a loss of another surface
-(likelihood.py) and for an oscillation (tones.py). The directions are
+direction is a view: a block of one axis (likelihood.py) with tests for a step, for a loss of another surface
+and for an oscillation (tones.py). The directions are
 
 * each axis, for the surfaces that do not move it;
-* in a plane that several surfaces move, the direction across the column g of each: m = (-g_2, g_1) / |g|. The
-  planes are roll and yaw; if accelerometers are used (forces.py), also pitch and normal force, and roll or
-  yaw and side force.
+* in a plane of two rows, the direction across the column g of each surface that moves both. The planes are
+  roll and yaw; if accelerometers are used (forces.py), also pitch and normal force, and roll or yaw and side
+  force.
 
-Declared errors may turn the column. Then a share of the innovation along the column leaks into the
-projection, at most (|m_1| e_1 + |m_2| e_2) / (|g| - |m_2| e_1 - |m_1| e_2), where e_1 and e_2 bound the
-errors of the surface's own terms, rad/s2 per rad. This share is tolerated like an error of a coefficient. A
-test excludes at the alarm level, so noise and bounded uncertainty exclude as rarely as they raise an alarm.
+*Leak.* Errors e of the column turn it. Then a share of the innovation along g leaks into the view
+(`turn_view`). It is tolerated like an error of a coefficient. A test excludes at the alarm level, so noise
+and bounded uncertainty exclude as rarely as they raise an alarm.
 
-The gust estimated from the vanes is subtracted from the rates only if the forces are measured. Without that
+*Gust.* The estimate from the vanes is subtracted from the rates only if the forces are measured. Without that
 measurement a surface that does not follow its command produces a force that looks like a gust; then the
 whole declared gust counts as noise. The rolling gust always does: no vane measures it.
 
-An error of a vane changes a rate and its force, and so does the false gust estimate that it causes. If a view
-uses a vane, it excludes a surface only after a view that is insensitive to the vane confirms it. That is a
-view across the column of the vane, with the gust estimated from the forces, or a view of the force at the
-flow angle that integrated inertial motion gives.
+*Vanes.* An error of a vane changes a rate and its force, and so does the false gust estimate that it causes.
+A view that uses a vane excludes a surface only after a view that is insensitive to the vane confirms it: one
+across the column of the vane's error, or one of a force at the flow angle from inertial motion.
 
-A broken accelerometer changes a force and no rate. If accelerometers may break, a force raises no alarm, and
-blocks and the views of an axis use no gust estimate that rests on accelerometers. An alarm of the rates then
-shows that another part is broken, and after it the views count as usual. Forces that are known or suspected
-to be wrong are not used.
+*Accelerometers.* A broken one changes a force and no rate. If accelerometers may break, a force raises no
+alarm, and blocks and the views of an axis use no gust estimate that rests on accelerometers. An alarm of the
+rates then shows that another part is broken, and after it the views count as usual. Forces that are known or
+suspected to be wrong are not used.
 
 What each view may do, by what is subtracted from its rates (`source`), if the forces are used:
 
@@ -43,14 +41,8 @@ What each view may do, by what is subtracted from its rates (`source`), if the f
     across the column of a surface   VANED       if of a force (*)     yes         needed for both
     across the column of a vane      VANELESS    no                    no          given
 
-(*) Its direction has |m_j| > MIN_FORCE_PART in the row j of its force, and accelerometers cannot break. The
-views marked "given" whose row j is `confirmer` give the confirmation. The score of the confirmed view is then
-
-    min(peak, P alarm_level / sqrt(2 margin)),    P: the largest peak of the views that confirm
-
-so P need only reach sqrt(2 margin), the level of the isolation. If the forces are not used, a view that sees
-a force scores 0, and no other needs confirmation. A view never excludes a surface that moves it
-(`changes_view`).
+(*) Its direction has |m_j| > MIN_FORCE_PART in the row j of its force, and accelerometers cannot break. If
+the forces are not used, a view that sees a force scores 0, and no other needs confirmation.
 
 Letters of the kernels, in addition to those of likelihood.py and rows.py:
 
@@ -59,7 +51,7 @@ Letters of the kernels, in addition to those of likelihood.py and rows.py:
     b, f        block of a view; record of a force; b.source: what is subtracted from its rates (rows.py);
                 from VANELESS on no vane is used
     L           acceleration per rad/s of the aircraft against the air, 1/s
-    cfg         configuration of the statistical tests (TESTING_RECORD)
+    stat, cfg   record of the detector (statistical.py), and its configuration of the tests
 
 parity_design.py fills the views from what a scenario declares.
 """
@@ -70,10 +62,18 @@ import numpy as np
 
 from beaver_ftc.aircraft.schema import MAX_SURFACES
 from beaver_ftc.compiled import kernel, record, sized
+from beaver_ftc.design.table import AIRSPEED
 from beaver_ftc.diagnosis.detection import likelihood
+from beaver_ftc.diagnosis.detection.blocks import (
+    MIN_ETA_RAD_S2,
+    USUAL_HYPOTHESES,
+    BlockCapacity,
+    block_dtype,
+    reset_slot,
+    restarting_slot,
+)
 from beaver_ftc.diagnosis.detection.directions import project
 from beaver_ftc.diagnosis.detection.forces import MIN_UPDATES
-from beaver_ftc.diagnosis.detection.likelihood import USUAL_HYPOTHESES, BlockCapacity
 from beaver_ftc.diagnosis.detection.rows import (
     INERTIAL,
     RAW,
@@ -85,7 +85,7 @@ from beaver_ftc.diagnosis.detection.rows import (
 from beaver_ftc.diagnosis.detection.tones import tones_dtype, update_tones, within_limits
 from beaver_ftc.diagnosis.detection.whitening import add_turn_to_drift
 from beaver_ftc.diagnosis.gust_drift import project_gust, view_drift
-from beaver_ftc.diagnosis.state import SIDE_FORCE
+from beaver_ftc.diagnosis.state import ROLL, SIDE_FORCE
 
 PEAK_MEMORY_RATIO = 5.0  # time constant of `peak` over the one with which evidence is forgotten
 MIN_FORCE_PART = 0.9  # component of a direction of length 1, above which a view counts as one of the force
@@ -119,14 +119,10 @@ def view_dtype(size: BlockCapacity) -> np.dtype:
         # the rows (i, k, j) that it combines: k = -1 if only two, j the force if it sees one; col: g / |g|
         places=(int, 3), col=5,
         by_force=int,  # whether it sees a force
-        # row of the force of the views that confirm this one, read of VANED views alone; -1 for a view of
-        # rates that uses no vane
-        confirmer=int,
-        # in this frame: whether the view is used; share of nu along the column that leaks into it
-        used=int, leak=float,
+        confirmer=int,  # row of the force of the views that confirm this one, if it is VANED
         L_rate=3, L_force=3,  # L by the rates and by the forces that it combines, 1/s: fill_view_drift
-        peak=float,  # largest score, decaying slowly
-        block=likelihood.block_dtype(size), tones=tones_dtype(size.max_regressors),
+        peak=float,  # largest score, decaying slowly; 0 while the view is not used
+        block=block_dtype(size), tones=tones_dtype(size.max_regressors),
     )  # fmt: skip
 
 
@@ -148,12 +144,12 @@ def turn_view(view, rows, gust):
     col = view.col
     c = view.nulled
     i, k, j = view.places[0], view.places[1], view.places[2]
-    g_i, g_k, g_j = rows.G[c, i], 0.0, rows.G[c, j]
-    q_i, q_k = 0.0, 1.0
-    if k >= 0:
-        L, C = gust.output.rate_damping, gust.output.C
-        g_k = rows.G[c, k]
-        q_i, q_k = project_gust(L[i], C, 0), project_gust(L[k], C, 0)
+    L, C = gust.output.rate_damping, gust.output.C
+    g_i = rows.G[c, i]
+    g_j = rows.G[c, j]
+    g_k = rows.G[c, k] if k >= 0 else 0.0
+    q_i = project_gust(L[i], C, ROLL) if k >= 0 else 0.0
+    q_k = project_gust(L[k], C, ROLL) if k >= 0 else 1.0
     m_i, m_k, m_j = -g_j * q_k, g_j * q_i, g_i * q_k - g_k * q_i
     norm = np.sqrt(g_i * g_i + g_k * g_k + g_j * g_j)
     norm_m = np.sqrt(m_i * m_i + m_k * m_k + m_j * m_j)
@@ -183,9 +179,10 @@ def fill_view_drift(view, q, gust, source_gust, forces, V):
     b = view.block
     L = gust.output.rate_damping
     m = b.m[0]
-    Q_d = q * max(b.eta[0], likelihood.MIN_ETA_RAD_S2) ** 2
-    for i, f in enumerate(forces.component):
-        Q_d += (b.source == INERTIAL) * (m[SIDE_FORCE + i] * forces.q_ratio) ** 2 * f.Q_e
+    Q_d = q * max(b.eta[0], MIN_ETA_RAD_S2) ** 2
+    if b.source == INERTIAL:
+        for i, f in enumerate(forces.component):
+            Q_d += (m[SIDE_FORCE + i] * forces.q_ratio) ** 2 * f.Q_e
     if gust.output.gusty:
         for j in range(3):
             view.L_rate[j] = project_gust(m, L, j)
@@ -199,46 +196,46 @@ def fill_view_drift(view, q, gust, source_gust, forces, V):
 
 
 @kernel
-def project_views(views, noise, rows, forces, gust, vaned, vaneless, V):
-    """Bring direction, noise, signatures and regressors of each view in use to the elapsed frame; V m/s.
+def project_view(view, stat, vaned, V):
+    """Bring direction, noise, signatures and regressors of a view to the elapsed frame; V m/s.
 
-    gust, vaned, vaneless: the gust estimates (rows.py). A view of RAW rates takes the rotation of the air
-    from `gust`, the others from `vaned`; if forces are in use, a view without vanes has the drift of
-    `vaneless`. The order matters: the direction is turned before the rows are projected on it.
+    vaned: the gust estimate of the views by vanes. A view of RAW rates takes the rotation of the air from
+    `gust`, the others from `vaned`; if forces are in use, a view without vanes has the drift of `vaneless`.
+    The order matters: the direction is turned before the rows are projected on it.
     """
-    for view in views:
-        b = view.block
-        view.used = not view.by_force or (forces.in_use and forces.n_seen == MIN_UPDATES)
-        if not view.used:
-            continue
-        air = gust if b.source == RAW else vaned
-        view.leak = turn_view(view, rows, air) if view.nulled != AXIS_VIEW else 0.0
-        project_rows(b, rows)
-        if view.nulled != AXIS_VIEW and b.n_Z > 0:
-            fill_leak(b, rows, view.leak, view.col)
-        source_gust = vaneless if b.source >= VANELESS and forces.in_use else air
-        fill_view_drift(view, noise.q, air, source_gust, forces, V)
+    b = view.block
+    rows, forces = stat.rows, stat.forces
+    air = stat.gust if b.source == RAW else vaned
+    is_across = view.nulled != AXIS_VIEW
+    leak = turn_view(view, rows, air) if is_across else 0.0
+    project_rows(b, rows)
+    if is_across and b.n_Z > 0:
+        fill_leak(b, rows, leak, view.col)
+    source_gust = stat.vaneless if b.source >= VANELESS and forces.in_use else air
+    fill_view_drift(view, stat.noise.q, air, source_gust, forces, V)
 
 
 @kernel
-def update_views(views, cfg, c, y, dt, k, latched):
-    """Update filter and tests of each view with frame k, as `statistical.update_blocks`; y (4 + signals,)
-    measured.
+def update_views(stat, vaned, y, dt, k, latched):
+    """Bring filter and tests of each view to frame k, as `statistical.update_blocks`; y (4 + signals,)
+    measured; vaned: of `project_view`.
 
-        peak <- max((1 - (1 - forget) / PEAK_MEMORY_RATIO) peak, score)      0 while the view is not used
+        peak <- max((1 - (1 - forget) / PEAK_MEMORY_RATIO) peak, score)
 
-    c: configuration of the oscillation tests (TONE_RECORD); latched: the detector has raised its alarm, so
-    evidence decays and no slot restarts.
+    latched: the detector has raised its alarm, so evidence decays and no slot restarts. A view that sees a
+    force is used only while the forces are.
     """
+    cfg, c, forces = stat.test, stat.tone_test_config, stat.forces
     inside = within_limits(c, y)
     decay = cfg.forget if latched else 1.0
-    slot = likelihood.restarting_slot(k)
-    for view in views:
-        if not view.used:
+    slot = restarting_slot(k)
+    for view in stat.views[: stat.n_views]:
+        if view.by_force and not (forces.in_use and forces.n_seen == MIN_UPDATES):
             view.peak = 0.0
             continue
+        project_view(view, stat, vaned, y[AIRSPEED])
         if not latched:
-            likelihood.reset_slot(view.block, slot)
+            reset_slot(view.block, slot)
         likelihood.update_block(view.block, dt, decay)
         # The error of the integrated angle oscillates with the aircraft's own modes.
         if view.block.source != INERTIAL:
@@ -265,13 +262,13 @@ def changes_view(view, forces, s, G):
 def view_score(view):
     """The largest score of the tests of a view."""
     score = view.tones.score
-    for h in range(view.block.n_h):
-        score = max(score, view.block.hypothesis[h].score)
+    for h in view.block.hypothesis[: view.block.n_h]:
+        score = max(score, h.score)
     return score
 
 
 @kernel
-def confirmed_score(view, views, cfg, forces):
+def confirmed_score(view, stat):
     """The score of a view, limited by the views that confirm that it is not an error of a vane:
 
         view                                       score
@@ -279,48 +276,50 @@ def confirmed_score(view, views, cfg, forces):
         source not VANED, or no forces are used    `view_score`: no confirmation is needed
         others                                     min(peak, P alarm_level / sqrt(2 margin))
 
-    P: the largest peak of the views that confirm; it must reach the level of the isolation, sqrt(2 margin).
-    Peaks are compared because a view and its confirmation may reach their levels at different times. No error
-    of a vane changes the rates alone, so a view of RAW rates needs no confirmation.
+    P: the largest peak of the views without vanes whose row of a force is `confirmer`; it must reach the
+    level of the isolation, sqrt(2 margin). Peaks are compared because a view and its confirmation may reach
+    their levels at different times. No error of a vane changes the rates alone, so a view of RAW rates needs
+    no confirmation.
     """
-    if view.by_force and not forces.in_use:
+    in_use = stat.forces.in_use
+    if view.by_force and not in_use:
         return 0.0
-    if view.block.source != VANED or not forces.in_use:
+    if view.block.source != VANED or not in_use:
         return view_score(view)
-    peak = 0.0
-    for other in views:
+    P = 0.0
+    for other in stat.views[: stat.n_views]:
         if other.block.source >= VANELESS and other.places[FORCE_PLACE] == view.confirmer:
-            peak = max(peak, other.peak)
-    return min(view.peak, peak * cfg.alarm_level / np.sqrt(2.0 * cfg.margin))
+            P = max(P, other.peak)
+    return min(view.peak, P * stat.test.alarm_level / np.sqrt(2.0 * stat.test.margin))
 
 
 @kernel
-def view_alarm_score(view, views, cfg, forces, gust):
+def view_alarm_score(view, stat):
     """The score with which a view raises the alarm, 0 if it raises none.
 
     Views raise it only where no block of the rates tests: for an oscillation about an axis, and for a
     force. A force raises it only if accelerometers cannot break: then the blocks' gust estimate uses them.
     """
     if view.nulled == AXIS_VIEW:
-        return view.tones.score if view.block.source != INERTIAL else 0.0
+        return view.tones.score  # 0 by inertia: `update_views`
     if (
-        gust.output.uses_accelerometers == 1
+        stat.gust.output.uses_accelerometers == 1
         and view.by_force
         and abs(view.block.m[0, view.places[FORCE_PLACE]]) > MIN_FORCE_PART
         and view.block.source == VANED
     ):
-        return confirmed_score(view, views, cfg, forces)
+        return confirmed_score(view, stat)
     return 0.0
 
 
 @kernel
-def views_exclude(views, cfg, forces, s, G):
+def views_exclude(stat, s, G):
     """True if a view detects a signal that no fault of surface s, with this column (3,) of G, can cause."""
-    for view in views:
+    for view in stat.views[: stat.n_views]:
         if (
             view.block.source < VANELESS
-            and not changes_view(view, forces, s, G)
-            and confirmed_score(view, views, cfg, forces) > cfg.alarm_level
+            and not changes_view(view, stat.forces, s, G)
+            and confirmed_score(view, stat) > stat.test.alarm_level
         ):
             return True
     return False

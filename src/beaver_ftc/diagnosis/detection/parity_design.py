@@ -11,18 +11,19 @@ import numpy as np
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.aircraft.schema import MAX_TERMS_OF_ONE
 from beaver_ftc.compiled import fill
-from beaver_ftc.diagnosis.detection import likelihood
+from beaver_ftc.diagnosis.detection.block_design import ROLL_YAW_PLANE, Entry, configure_block
+from beaver_ftc.diagnosis.detection.blocks import (
+    LATERAL_BLOCK,
+    N_ROWS,
+    PITCH_BLOCK,
+    STEP_FAULT,
+    BlockCapacity,
+)
 from beaver_ftc.diagnosis.detection.forces import (
     FORCE_NAMES,
     NORMAL_INDEX,
     SIDE_INDEX,
     terms_of_force,
-)
-from beaver_ftc.diagnosis.detection.likelihood import (
-    LATERAL_BLOCK,
-    PITCH_BLOCK,
-    STEP_FAULT,
-    BlockCapacity,
 )
 from beaver_ftc.diagnosis.detection.parity import AXIS_VIEW, VANE_VIEW, StatisticalSize
 from beaver_ftc.diagnosis.detection.rows import (
@@ -38,42 +39,35 @@ from beaver_ftc.diagnosis.state import LOSS, NORMAL_FORCE, PITCH, ROLL, SIDE_FOR
 from beaver_ftc.diagnosis.tolerances import moment_axis
 
 PITCH_PLANE = (PITCH, NORMAL_FORCE)
-ROLL_YAW_PLANE = (ROLL, YAW)
 YAW_PLANE = (YAW, SIDE_FORCE)
 
 
 class ParityDirection(NamedTuple):
     """A parity direction as it is set up.
 
-    nulled: the index of the surface to whose column of G the direction is orthogonal;
-    VANE_VIEW + i if it is orthogonal to the effect of an error of the vane of force i, SIDE_INDEX or
-    NORMAL_INDEX (`across_vane`); AXIS_VIEW if it is one row by itself (`is_axis`).
+    nulled: the index of the surface to whose column of G the direction is orthogonal; VANE_VIEW + i if it is
+    orthogonal to the effect of an error of the vane of force i, SIDE_INDEX or NORMAL_INDEX; AXIS_VIEW if it
+    is one row by itself (`is_axis`).
     rows: the rows on which the direction is 1 at the start (ROLL, PITCH, YAW, SIDE_FORCE, NORMAL_FORCE). The
     first `turn_view` in flight replaces this start, unless `is_axis`: a view across a lateral surface starts
     on roll alone, and then combines roll and yaw.
     plane_pair: the two rows in whose plane the direction lies: two rates, or a rate and a force.
     tested_losses: the indices of the surfaces for whose loss the view tests.
-    by_inertia: the force is that at the flow angle from inertial motion.
-    uses_vane_gust: a view of rates alone may subtract the gust estimate of the vanes. It is false if the
-    direction is roll, or mainly roll, because the vanes measure no rolling gust.
+    source: what is subtracted from its rates (rows.py). A view of rates alone is RAW if its direction is
+    roll, or mainly roll, because the vanes measure no rolling gust; if it is VANED here, it may become RAW
+    (`configure_parity_views`).
     """
 
     nulled: int
     rows: tuple[int, ...]
     plane_pair: tuple[int, int]
     tested_losses: list[int]
-    by_inertia: bool = False
-    uses_vane_gust: bool = False
+    source: int
 
     @property
     def is_axis(self) -> bool:
         """Whether the direction is one row by itself."""
         return self.nulled == AXIS_VIEW
-
-    @property
-    def across_vane(self) -> bool:
-        """Whether the direction is orthogonal to the effect of an error of a vane."""
-        return self.nulled >= VANE_VIEW
 
     @property
     def by_force(self) -> bool:
@@ -97,23 +91,24 @@ def list_directions(aircraft: Aircraft, with_forces: bool) -> Iterator[ParityDir
     """
     pitch = [s for s, axis in enumerate(aircraft.dominant_axis) if axis == PITCH]
     lateral = [s for s, axis in enumerate(aircraft.dominant_axis) if axis != PITCH]
-    yield ParityDirection(AXIS_VIEW, (PITCH,), PITCH_PLANE, pitch, uses_vane_gust=True)
-    yield ParityDirection(AXIS_VIEW, (ROLL,), ROLL_YAW_PLANE, lateral)
-    yield ParityDirection(AXIS_VIEW, (YAW,), ROLL_YAW_PLANE, lateral, uses_vane_gust=True)
+    yield ParityDirection(AXIS_VIEW, (PITCH,), PITCH_PLANE, pitch, VANED)
+    yield ParityDirection(AXIS_VIEW, (ROLL,), ROLL_YAW_PLANE, lateral, RAW)
+    yield ParityDirection(AXIS_VIEW, (YAW,), ROLL_YAW_PLANE, lateral, VANED)
     for s in lateral:
-        rolls = aircraft.dominant_axis[s] == ROLL  # then the direction across its column is mainly yaw
+        # across the column of a surface that rolls, the direction is mainly yaw
+        source = VANED if aircraft.dominant_axis[s] == ROLL else RAW
         others = [other for other in lateral if other != s]
-        yield ParityDirection(s, (ROLL,), ROLL_YAW_PLANE, others, uses_vane_gust=rolls)
+        yield ParityDirection(s, (ROLL,), ROLL_YAW_PLANE, others, source)
     if not with_forces:
         return
     for i, plane, tested in ((NORMAL_INDEX, PITCH_PLANE, pitch), (SIDE_INDEX, YAW_PLANE, lateral)):
         separable = aircraft.separated_by_force(FORCE_NAMES[i])
         for s in separable:
             pair = aircraft.dominant_axis[s], plane[1]
-            yield ParityDirection(s, pair, pair, [other for other in tested if other != s])
+            yield ParityDirection(s, pair, pair, [other for other in tested if other != s], VANED)
         if separable:
-            yield ParityDirection(VANE_VIEW + i, plane, plane, tested)
-            yield ParityDirection(AXIS_VIEW, plane[1:], plane, tested, by_inertia=True)
+            yield ParityDirection(VANE_VIEW + i, plane, plane, tested, VANELESS)
+            yield ParityDirection(AXIS_VIEW, plane[1:], plane, tested, INERTIAL)
 
 
 def required_size(aircraft: Aircraft) -> StatisticalSize:
@@ -164,79 +159,54 @@ def configure_parity_views(stat: np.void, aircraft: Aircraft) -> None:
     for view, d in zip(stat["views"][: len(directions)], directions, strict=True):
         # The view of an axis may raise an alarm, and the gust estimate uses accelerometers: no alarm may
         # depend on accelerometers that may break.
-        vaned = subtracts and d.uses_vane_gust and not (d.is_axis and accelerometers_may_break)
-        _configure_view(view, d, gusty, vaned)
-        rates = stat["block"][PITCH_BLOCK if d.plane_pair == PITCH_PLANE else LATERAL_BLOCK]
-        _configure_filter(view["block"], d, rates)
-        _configure_columns(view, d, rates, stat["rows"], forces)
-        _configure_hypotheses(view["block"], d, gusty)
+        keeps = d.by_force or (subtracts and not (d.is_axis and accelerometers_may_break))
+        view["block"]["source"] = RAW if d.source == VANED and not keeps else d.source
+        _configure_view(view, d, gusty)
+        _configure_block(view, d, gusty, stat)
 
 
-def _configure_view(view: np.void, d: ParityDirection, gusty: bool, vaned: bool) -> None:
-    """Fill the rows that a view combines, the axis that its alarm names, what is subtracted from its rates
-    (`source`), and the force of the views that confirm it.
-
-    vaned: whether the gust estimate of the vanes is subtracted from a view that sees no force. A view that
-    sees a force always has it subtracted, unless it uses no vane (across a vane's column, or by inertia).
-    """
+def _configure_view(view: np.void, d: ParityDirection, gusty: bool) -> None:
+    """Fill the rows that a view combines, the axis that its alarm names, and the force of the views that
+    confirm it."""
     first, second = d.plane_pair
-    if d.by_inertia:
-        source = INERTIAL
-    elif d.across_vane:
-        source = VANELESS
-    else:
-        source = VANED if vaned or d.by_force else RAW
-    view["block"]["source"] = source
     places = first, -1, second
-    if d.across_vane and d.plane_pair == YAW_PLANE and gusty:
+    if d.source == VANELESS and d.plane_pair == YAW_PLANE and gusty:
         # In moving air a view across the error of the side vane is orthogonal to the rolling gust as well.
         places = ROLL, YAW, second
-    alarm_axis = d.rows[0] if d.is_axis and not d.by_inertia else first  # a force alone names its rate's axis
+    alarm_axis = first if d.source == INERTIAL else d.rows[0]  # a force alone names its rate's axis
     # The force of the view's own plane confirms it; the side force confirms a view of roll and yaw.
-    force = SIDE_FORCE if d.plane_pair == ROLL_YAW_PLANE else second
-    confirmer = force if d.by_force or vaned else -1
+    confirmer = SIDE_FORCE if d.plane_pair == ROLL_YAW_PLANE else second
     fill(
         view, nulled=d.nulled, by_force=d.by_force, places=places, alarm_axis=alarm_axis, confirmer=confirmer,
     )  # fmt: skip
 
 
-def _configure_filter(b: np.void, d: ParityDirection, rates: np.void) -> None:
-    """Fill direction and filter of a view's block from the block of the rates that the view combines."""
-    rate_fields = {name: rates[name] for name in ("alarm_level", "noise_share", "eta_rate")}
-    fill(b, n=1, a=1.0, Q_scale=1.0, any_position=1, **rate_fields)
-    b["m"][0, d.rows], b["P_xx"][0, 0] = 1.0, rates["R_y"].max()
-    b["P_dd"][0, 0] = likelihood.DRIFT_PRIOR_RAD_S2**2
-
-
-def _configure_columns(
-    view: np.void, d: ParityDirection, rates: np.void, rows: np.void, forces: np.void
-) -> None:
-    """Fill the regressors that a view sees: those of its rates, of its force, of the flow angle from inertial
-    motion, and the leak, which is worked out in flight. A view of rates without regressors has no leak.
+def _configure_block(view: np.void, d: ParityDirection, gusty: bool, stat: np.void) -> None:
+    """Fill the block of a view from the block of the rates that it combines. Its hypotheses: a step of its
+    innovation, and a loss of each surface that it tests. Its regressors: those of its rates, of its force, of
+    the flow angle from inertial motion, and the leak, which is worked out in flight. A view of rates without
+    regressors has no leak.
     """
     b = view["block"]
-    columns = list(rates["columns"][: rates["n_Z"]])
-    if not columns and not d.by_force:
-        return
-    if d.by_force:
-        i = d.plane_pair[1] - SIDE_FORCE
-        first = int(rows["first"][i])
-        columns += range(first, first + int(forces["component"][i]["n_Z"]) + d.by_inertia)
-    set_columns(b, rows, columns)
-    if not d.is_axis:
-        b["tol"][b["n_Z"]] = 1.0
-        b["n_Z"] += 1
-
-
-def _configure_hypotheses(b: np.void, d: ParityDirection, gusty: bool) -> None:
-    """Fill the hypotheses of a view: a step of its innovation, and a loss of each surface that it tests."""
+    rows = stat["rows"]
+    rates = stat["block"][PITCH_BLOCK if d.plane_pair == PITCH_PLANE else LATERAL_BLOCK]
+    axis = int(view["alarm_axis"])
     # In moving air a view that sees the pitch rate tests no loss. A law that uses the vanes reacts to a gust,
     # and to the noise of the vanes, before the gyros measure a pitching effect. The effect of the elevator
     # then correlates with the noise of the view: with the whole gust, or, if the gust estimate of the vanes
     # is subtracted, with the noise of that estimate and the gust that it leaves.
-    lost = [] if gusty and PITCH in d.rows else d.tested_losses
-    kinds = [STEP_FAULT, *(LOSS for _ in lost)]
-    b["n_h"] = len(kinds)
-    hyps = b["hypothesis"][: len(kinds)]
-    hyps["kind"], hyps["surface"], hyps["signature"][0, 0] = kinds, [-1, *lost], 1.0
-    likelihood.set_signs(b, kinds)
+    losses = [] if gusty and PITCH in d.rows else d.tested_losses
+    entries = [Entry(STEP_FAULT, -1, axis), *(Entry(LOSS, s, axis) for s in losses)]
+    m = np.eye(N_ROWS)[list(d.rows)].sum(axis=0)
+    level = {name: rates[name] for name in ("alarm_level", "noise_share", "eta_rate")}
+    configure_block(b, [axis], m, rates["R_y"].max(keepdims=True), entries, any_position=1, **level)
+    columns = list(rates["columns"][: rates["n_Z"]])
+    if d.by_force:
+        i = d.plane_pair[1] - SIDE_FORCE
+        first = int(rows["first"][i])
+        columns += range(first, first + int(stat["forces"]["component"][i]["n_Z"]) + (d.source == INERTIAL))
+    if columns:
+        set_columns(b, rows, columns)
+        if not d.is_axis:
+            b["tol"][b["n_Z"]] = 1.0
+            b["n_Z"] += 1

@@ -31,14 +31,19 @@ from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.design.table import AIRSPEED
 from beaver_ftc.diagnosis.detection import likelihood, parity
 from beaver_ftc.diagnosis.detection.attitude import attitude_dtype
-from beaver_ftc.diagnosis.detection.forces import FORCES_RECORD
-from beaver_ftc.diagnosis.detection.likelihood import (
+from beaver_ftc.diagnosis.detection.blocks import (
     GROWING_LOSS,
     LATERAL_BLOCK,
     LOSS_END,
+    MIN_ETA_RAD_S2,
     N_FILTER_BLOCKS,
+    PITCH_BLOCK,
+    REVERTING_BLOCK,
     block_dtype,
+    reset_slot,
+    restarting_slot,
 )
+from beaver_ftc.diagnosis.detection.forces import FORCES_RECORD
 from beaver_ftc.diagnosis.detection.parity import (
     StatisticalSize,
     view_dtype,
@@ -103,10 +108,10 @@ def update_blocks(stat, dt, k, alarmed, may_end=False):
     gust = stat.gust
     blocks = stat.block
     decay = cfg.forget if alarmed else 1.0
-    slot = likelihood.restarting_slot(k)
+    slot = restarting_slot(k)
     for m, b in enumerate(blocks):
         if not alarmed:
-            likelihood.reset_slot(b, slot)
+            reset_slot(b, slot)
         project_rows(b, stat.rows)
         b.has_coarse = gust.config.coarse_only
         if gust.config.coarse_only:
@@ -114,7 +119,7 @@ def update_blocks(stat, dt, k, alarmed, may_end=False):
                 b.g_c[i] = gust.output.acc_coarse[axis]
         if gust.output.gusty:
             add_turn_to_drift(b, gust)
-            if m < likelihood.REVERTING_BLOCK:
+            if m < REVERTING_BLOCK:
                 whiten_calm(b, dt)
             else:  # without gust both blocks of roll and yaw have the same filter
                 b.calm.g = blocks[LATERAL_BLOCK].calm.g
@@ -128,7 +133,7 @@ def filter_known(blocks, gust, nu, dt):
 
     The whitened innovation replaces the `nu` of each block, which the next frame fills again.
     """
-    for b in blocks[: likelihood.REVERTING_BLOCK]:
+    for b in blocks[:REVERTING_BLOCK]:
         for i, axis in enumerate(b.axes[: b.n]):
             b.nu[i] = nu[axis] - gust.output.acc_mean[axis]
         whiten_step(b, b.x_known, b.nu, dt, b.nu)
@@ -140,13 +145,13 @@ def fill_unmodelled(blocks, gust, out):
 
     d: estimated drift; acc: effect of the gust that the vanes measure.
     """
-    for b in blocks[: likelihood.REVERTING_BLOCK]:
+    for b in blocks[:REVERTING_BLOCK]:
         for i, axis in enumerate(b.axes[: b.n]):
             out[axis] = b.x_known[D0 + i] + gust.output.acc[axis]
 
 
 @kernel
-def update_alarm(stat, views, t, bounded=True):
+def update_alarm(stat, t, bounded=True):
     """Fill the scores over the alarm level, the largest of them with its axis, and at the first alarm its
     time t s.
 
@@ -162,8 +167,8 @@ def update_alarm(stat, views, t, bounded=True):
         for h in b.hypothesis[: b.n_h]:
             if h.alarms:
                 keep_score(alarm, h.score / cfg.alarm_level, h.axis, h.column)
-    for v in views:
-        share = parity.view_alarm_score(v, views, cfg, stat.forces, stat.gust) / cfg.alarm_level
+    for v in stat.views[: stat.n_views]:
+        share = parity.view_alarm_score(v, stat) / cfg.alarm_level
         keep_score(alarm, share, v.alarm_axis, cfg.n_scores - len(AXES) + v.alarm_axis)
     if not bounded:
         alarm.ratio = 0.0
@@ -243,7 +248,7 @@ def excludes_loss(cfg, blocks, fies, loss_number, s, pitch_ends, abrupt):
         1        no          MIN_LLR_SHARE    1                a loss may grow, but is constant in each frame
         1        yes         1                1
     """
-    pitch = blocks[likelihood.PITCH_BLOCK]
+    pitch = blocks[PITCH_BLOCK]
     share_end = 1.0 if cfg.w == 1.0 else MIN_LLR_SHARE
     share = share_end if abrupt else MIN_LLR_SHARE
     best_pitch = best_alternative(pitch, fies, loss_number, s)
@@ -328,13 +333,13 @@ def fill_drift(noise, eta, blocks, gust, V, dt):
     """
     gusty = gust.output.gusty
     for m, b in enumerate(blocks):
-        reverts = m == likelihood.REVERTING_BLOCK
+        reverts = m == REVERTING_BLOCK
         length = b.drift_correlation_length_m
         for i, axis in enumerate(b.axes[: b.n]):
             for j in range(b.n):
                 q_gust = unmeasured_drift(gust, V, axis, b.axes[j], reverts) if gusty else 0.0
                 b.Q_d[i, j] = b.Q_scale * q_gust
-            q_eta = noise.q * max(eta[axis], likelihood.MIN_ETA_RAD_S2) ** 2
+            q_eta = noise.q * max(eta[axis], MIN_ETA_RAD_S2) ** 2
             b.Q_d[i, i] += q_eta
             b.calm.Q_d[i, i] = q_eta
             b.calm.Q_x[i] = noise.Q[axis]

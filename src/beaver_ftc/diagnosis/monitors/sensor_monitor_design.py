@@ -7,8 +7,8 @@ import numpy as np
 
 from beaver_ftc.aircraft.aircraft import EARTH_RADIUS_M, GRAVITY_MPS2
 from beaver_ftc.compiled import fill
-from beaver_ftc.design.turbulence import Dryden
 from beaver_ftc.design.model import DesignFunctions
+from beaver_ftc.design.turbulence import Dryden
 from beaver_ftc.diagnosis.bounds_design import GUST_LIMIT_SIGMA
 from beaver_ftc.diagnosis.deviations import air_rotation_slopes
 from beaver_ftc.diagnosis.monitors.flow_or_force import N_FROZEN_NEVER

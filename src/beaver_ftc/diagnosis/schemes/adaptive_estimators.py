@@ -93,10 +93,10 @@ def weigh_loss(fdi, j):
 
 @apart(long_loops=True)
 def weigh_position(fdi, j):
-    """Fill `unlikely` of estimator j by the parity views."""
+    """Fill `unlikely` of estimator j: whether a parity view shows motion that its surface cannot cause."""
     stat, fies = fdi.statistical, fdi.isolation.estimator
     G = fies[fdi.layout.position[fies[j].surface]].effect.Z
-    isolation.weigh_views(fies[j], stat.views[: stat.n_views], stat.test, stat.forces, G)
+    fies[j].unlikely = parity.views_exclude(stat, fies[j].surface, G)
 
 
 @kernel
@@ -174,16 +174,13 @@ def update_tests(fdi, prediction, measured, k, t):
     """Test the innovation of the elapsed frame, which ends at frame k, t s, for every hypothesis: in the
     blocks of the rates, against the attitude, and in the parity views."""
     stat, y, dt = fdi.statistical, measured.y, fdi.config.dt
-    views = stat.views[: stat.n_views]
     alarmed = stat.alarm.detected_at_s >= 0.0
     fill_rows(fdi, prediction, y)
     statistical.update_blocks(stat, dt, k, alarmed, not fdi.config.abrupt)
     if stat.attitude.enabled:
         compare_attitude(fdi, measured.x)
-    vaned, V = gust_of_views(stat), y[AIRSPEED]
-    parity.project_views(views, stat.noise, stat.rows, stat.forces, stat.gust, vaned, stat.vaneless, V)
-    parity.update_views(views, stat.test, stat.tone_test_config, y, dt, k, alarmed)
-    statistical.update_alarm(stat, views, t, fdi.bound.error_map.outside == 0)
+    parity.update_views(stat, gust_of_views(stat), y, dt, k, alarmed)
+    statistical.update_alarm(stat, t, fdi.bound.error_map.outside == 0)
     innovation_known(prediction, measured.x, dt)
     statistical.filter_known(stat.block, stat.gust, prediction.nu_known, dt)
 

@@ -19,9 +19,9 @@ what was before the fault only adds noise:
 
 Unknown constants c_j, |c_j| <= tol_j, multiply known accelerations r_j: the errors of coefficients, and for
 each axis by itself a share of the bounded uncertainty, taken as constant, and errors of the damping. Through
-the same filter they add c_j z_j and c_j R_j to the sums. Without a fault of a surface
+the same filter they add c_j z_j and c_j N_j to the sums. Without a fault of a surface
 
-    (|z| - sum_j tol_j |z_j|) sqrt(1 - a^2)          (|N| - sum_j tol_j |R_j|) / sqrt M
+    (|z| - sum_j tol_j |z_j|) sqrt(1 - a^2)          (|N| - sum_j tol_j |N_j|) / sqrt M
 
 are at most standard normal. If one exceeds level = sqrt(2 margin), with the margin of isolation, no gyro is
 the cause.
@@ -38,19 +38,19 @@ and attitude turn.
 A loss acts on roll and yaw together, so an axis i has a `row` in a block of the rates: pitch is row 0 of its
 block, roll is row 0 and yaw row 1 of theirs.
 
-Letters of the record and of the kernels, for each axis i:
+Letters of the record and of the kernels, for each axis i. Input j = 0 is that of g; inputs j = 1, ... are the
+known accelerations, so z_0 = z, N_0 = N:
 
-    s, s_j, s_h     states (psi rad, xi rad/s, d rad/s2) of the filters of g, of g_j and of the g_s of loss h
+    u_j, g_j        input of a filter, rad/s2: u_0 is -nu less the damping by the other axes, others are r_j;
+                    its response over sqrt S
+    s_j, s_h        states (psi rad, xi rad/s, d rad/s2) of the filters of g_j and of the g_s of loss h
     P, K, S         covariance (3, 3) and gain (3,) of these filters; variance of g, rad2
-    u               input of a filter, rad/s2: of g, -nu less the damping by the other axes; of g_j, r_j; of
-                    g_s, the signature of the loss
-    r, g_j          known accelerations r_j, rad/s2; responses to them over sqrt S
-    n               number of the constants: those of the block, then the N_FURTHER
-    z, z_j          leaky sums of g and g_j over sqrt S; a (m,): their leaks per frame
-    N, M, R_j       correlations with the loss h; b: their leak per frame
+    n               number of the inputs: of g, of the constants of the block, and the N_FURTHER
+    z_j             leaky sums of g_j; a (m,): their leaks per frame
+    M, N_j          correlations with the loss h; b: their leak per frame
     T, E            leaky sums of dA, and of its bound by constant errors, rad; their leaks are a, too
     a_d             factor of the drift d per frame (`a` of the block)
-    blk, row        block of the rates (likelihood.py) and row of the axis in it
+    blk, row        block of the rates (blocks.py) and row of the axis in it
 """
 
 from math import exp, sqrt
@@ -81,7 +81,7 @@ BLOCK_ROWS = (0, 0, 1)  # row of roll, pitch and yaw in the block that has the a
 @sized
 def attitude_dtype(capacity: BlockCapacity) -> np.dtype:
     """The comparison of attitude and rates, for the capacity of a block of the rates."""
-    n = capacity.max_regressors + N_FURTHER
+    n = 1 + capacity.max_regressors + N_FURTHER
     n_h = capacity.max_hypotheses
     n_a = len(LEAK_TIMES_S)
     return record(
@@ -89,8 +89,8 @@ def attitude_dtype(capacity: BlockCapacity) -> np.dtype:
         D=(3, 3), R=float, a=n_a, b=float,  # 1/s; variance of v, rad2; factors per frame
         P_start=3, P=(3, 3, 3), F_P=(3, 3),  # P_start: diagonal of P at the start; F_P: the product F P
         turn=3, A=3,  # turn of the attitude beyond that of the gyros, rad: in this frame, and in all frames
-        s=(3, 3), s_j=(3, n, 3), s_h=(3, n_h, 3),
-        n=(int, 3), r=n, g_j=n, xi=3, z=(3, n_a), z_j=(3, n, n_a), N=(3, n_h), M=(3, n_h), R_j=(3, n_h, n),
+        s=(3, n, 3), s_h=(3, n_h, 3),
+        n=(int, 3), u=n, tol=(3, n), g=n, xi=3, z=(3, n, n_a), M=(3, n_h), N=(3, n_h, n),
         score=float,  # largest of the sums of both kinds, over their level; 0 in frames that do not need it
         e_0=3, e_slope=3, tilt=float,  # parts of e_T: rad/s; share of the axis' rate; rad, times all rates
         T=(3, n_a), E=(3, n_a), T_std=n_a,
@@ -130,8 +130,8 @@ def configure_attitude(att: np.void, D: np.ndarray, errors: SensorErrors, margin
 def restart(att):
     """Restart all filters and sums: near the vertical the attitude shows no turn."""
     att.turn[:] = att.A[:] = att.P[:] = 0.0
-    att.s[:] = att.s_j[:] = att.s_h[:] = 0.0
-    att.z[:] = att.z_j[:] = att.N[:] = att.M[:] = att.R_j[:] = 0.0
+    att.s[:] = att.s_h[:] = 0.0
+    att.z[:] = att.M[:] = att.N[:] = 0.0
     att.T[:] = att.E[:] = 0.0
     for i in range(3):
         for k in range(3):
@@ -155,15 +155,15 @@ def compare_attitude(att, blocks, eta, x, dt, detected):
     pitch, lateral = blocks[PITCH_BLOCK], blocks[LATERAL_BLOCK]
     block_of_axis = lateral, pitch, lateral
     sum_turns(att, x, dt)
-    copy(att.s[:, 1], att.xi)
+    copy(att.s[:, 0, 1], att.xi)
     for i, blk in enumerate(block_of_axis):
         advance_axis(att, i, blk, BLOCK_ROWS[i], eta[i], dt, detected)
     att.score, att.gyro = 0.0, -1
     worst = np.argmax(att.turn_score)
     if detected or att.turn_score[worst] > 1.0:
         att.score = max(largest_correlation(att, pitch, 1), largest_correlation(att, lateral, 0))
-        for i, blk in enumerate(block_of_axis):
-            att.score = max(att.score, largest_sum(att, blk, i))
+        for i in range(3):
+            att.score = max(att.score, largest_sum(att, i))
         find_gyro(att, worst)
 
 
@@ -207,86 +207,70 @@ def find_gyro(att, worst):
 def advance_axis(att, i, blk, row, eta, dt, detected):
     """Advance filter, responses and sums of axis i, which is this row of its block.
 
-        z <- a z + g / sqrt S      z_j <- a z_j + g_j / sqrt S
+        z_j <- a z_j + g_j      M <- b M + g_s^2      N_j <- b N_j + g_s g_j      g over sqrt S
 
-    N, M and R_j are added to once the rates have raised an alarm (`detected`). eta rad/s2: bound on the
+    M and N_j are added to once the rates have raised an alarm (`detected`). eta rad/s2: bound on the
     uncertainty of the axis.
     """
     D, a_d = att.D[i, i], blk.a
     att.A[i] += att.turn[i]
     att.turn[i] = 0.0
-    u = fill_known(att, i, blk, row, eta)
+    fill_inputs(att, i, blk, row, eta)
     K, S = advance_P(att, i, blk, row, dt)
     std = np.sqrt(S)
-    g = respond(att.s[i], att.A[i], u, D, a_d, K, dt) / std
-    leak(att.z[i], att.a, g)
-    for j in range(att.n[i]):
-        att.g_j[j] = respond(att.s_j[i, j], 0.0, att.r[j], D, a_d, K, dt) / std
-        leak(att.z_j[i, j], att.a, att.g_j[j])
+    n = att.n[i]
+    for j in range(n):
+        A = att.A[i] if j == 0 else 0.0
+        att.g[j] = respond(att.s[i, j], A, att.u[j], D, a_d, K, dt) / std
+        leak(att.z[i, j], att.a, att.g[j])
     for h, hypothesis in enumerate(blk.hypothesis[: blk.n_h]):
         if hypothesis.kind == LOSS:
             g_s = respond(att.s_h[i, h], 0.0, hypothesis.signature[row], D, a_d, K, dt) / std
             if detected:
-                correlate(att, i, h, g_s, g)
+                att.M[i, h] = att.b * att.M[i, h] + g_s * g_s
+                for j in range(n):
+                    att.N[i, h, j] = att.b * att.N[i, h, j] + g_s * att.g[j]
 
 
 @kernel
-def fill_known(att, i, blk, row, eta):
-    """Fill the known accelerations r (n,) of axis i, rad/s2, and their number n; return the input u of its
-    filter, rad/s2:
+def fill_inputs(att, i, blk, row, eta):
+    """Fill the inputs u (n,) of axis i, rad/s2, their tolerances and their number n.
 
-        r = (regressors of the block, eta, D_i0 xi_0, D_i1 xi_1, D_i2 xi_2)
-        u = -nu - sum_j D_ij xi_j,  j != i
+        u_0 = -nu - sum_j D_ij xi_j,  j != i
+        u_1, ... = regressors of the block, eta, D_i0 xi_0, D_i1 xi_1, D_i2 xi_2
 
-    eta rad/s2: bound on the uncertainty; xi (3,) rad/s: of the frame before.
+    tol: as in the block, then 1 of the bounded uncertainty, whose input is its bound, then DAMPING_TOLERANCE
+    of the damping by the three rates. eta rad/s2: bound on the uncertainty; xi (3,) rad/s: of the frame
+    before.
     """
-    n = blk.n_Z
-    att.n[i] = n + N_FURTHER
-    for j in range(n):
-        att.r[j] = blk.regressor[j, row]
-    att.r[n] = eta
-    u = -blk.nu[row]
+    u, tol = att.u, att.tol[i]
+    u[0] = -blk.nu[row]
+    for j in range(blk.n_Z):
+        u[1 + j] = blk.regressor[j, row]
+        tol[1 + j] = blk.tol[j]
+    k = 1 + blk.n_Z
+    u[k] = eta
+    tol[k] = 1.0
     for j in range(3):
-        att.r[n + 1 + j] = att.D[i, j] * att.xi[j]
+        k += 1
+        u[k] = att.D[i, j] * att.xi[j]
+        tol[k] = DAMPING_TOLERANCE
         if j != i:
-            u -= att.r[n + 1 + j]
-    return u
+            u[0] -= u[k]
+    att.n[i] = k + 1
 
 
 @kernel
-def correlate(att, i, h, g_s, g):
-    """Add the frame to the correlations of axis i with the loss h; g_s, g and g_j are over sqrt S.
-
-    N <- b N + g_s g      M <- b M + g_s^2      R_j <- b R_j + g_s g_j
-    """
-    att.N[i, h] = att.b * att.N[i, h] + g_s * g
-    att.M[i, h] = att.b * att.M[i, h] + g_s * g_s
-    for j in range(att.n[i]):
-        att.R_j[i, h, j] = att.b * att.R_j[i, h, j] + g_s * att.g_j[j]
-
-
-@kernel
-def tol(blk, j, n):
-    """tol_j of constant j of n: of a coefficient as in the block, then 1 of the bounded uncertainty, whose
-    r_j is its bound, then DAMPING_TOLERANCE of the damping by the three rates."""
-    k = j - n + N_FURTHER
-    if k < 0:
-        return blk.tol[j]
-    return 1.0 if k == 0 else DAMPING_TOLERANCE
-
-
-@kernel
-def largest_sum(att, blk, i):
+def largest_sum(att, i):
     """The part of the leaky sums of axis i that no constants explain, largest over the leaks, over the level:
 
     max (|z| - sum_j tol_j |z_j|) sqrt(1 - a^2) / level
     """
     largest = 0.0
-    n = att.n[i]
     for m, a in enumerate(att.a):
-        excess = abs(att.z[i, m])
-        for j in range(n):
-            excess -= tol(blk, j, n) * abs(att.z_j[i, j, m])
+        excess = abs(att.z[i, 0, m])
+        for j in range(1, att.n[i]):
+            excess -= att.tol[i, j] * abs(att.z[i, j, m])
         largest = max(largest, excess * np.sqrt(1.0 - a * a))
     return largest / att.level
 
@@ -296,10 +280,10 @@ def largest_correlation(att, blk, first):
     """The part of the correlations with losses that no constants explain, largest over the losses of a block,
     over the level:
 
-        max (|N| - sum_j tol_j |R_j|) / (level sqrt M)
+        max (|N| - sum_j tol_j |N_j|) / (level sqrt M)
 
-    N, M, R_j: sums over the axes of the block, which are first, first + 2, ...: pitch (first 1), or roll and
-    yaw (first 0). For the uncertainty and the damping, |R_j| is the sum of the axes' magnitudes: each axis
+    N_j, M: sums over the axes of the block, which are first, first + 2, ...: pitch (first 1), or roll and
+    yaw (first 0). For the uncertainty and the damping, |N_j| is the sum of the axes' magnitudes: each axis
     has a constant of its own.
     """
     largest = 0.0
@@ -309,14 +293,14 @@ def largest_correlation(att, blk, first):
             continue
         N = M = 0.0
         for i in range(first, 3, 2):
-            N += att.N[i, h]
+            N += att.N[i, h, 0]
             M += att.M[i, h]
         excess = abs(N)
-        for j in range(n):
-            R = 0.0
+        for j in range(1, n):
+            N_j = 0.0
             for i in range(first, 3, 2):
-                R += abs(att.R_j[i, h, j]) if j >= n - N_FURTHER else att.R_j[i, h, j]
-            excess -= tol(blk, j, n) * abs(R)
+                N_j += abs(att.N[i, h, j]) if j >= n - N_FURTHER else att.N[i, h, j]
+            excess -= att.tol[first, j] * abs(N_j)
         if M > 0.0:
             largest = max(largest, excess / np.sqrt(M))
     return largest / att.level
@@ -330,9 +314,13 @@ def respond(s, A, u, D, a_d, K, dt):
         psi <- psi + dt xi      xi <- xi + dt (d + u - D xi)      d <- a_d d
         g = A - psi             s <- s + K g
     """
-    psi, xi, d = s[0] + dt * s[1], s[1] + dt * (s[2] + u - D * s[1]), a_d * s[2]
+    psi = s[0] + dt * s[1]
+    xi = s[1] + dt * (s[2] + u - D * s[1])
+    d = a_d * s[2]
     g = A - psi
-    s[0], s[1], s[2] = psi + K[0] * g, xi + K[1] * g, d + K[2] * g
+    s[0] = psi + K[0] * g
+    s[1] = xi + K[1] * g
+    s[2] = d + K[2] * g
     return g
 
 

@@ -26,14 +26,7 @@ the same filter they add c_j z_j and c_j N_j to the sums. Without a fault of a s
 are at most standard normal. If one exceeds level = sqrt(2 margin), with the margin of isolation, no gyro is
 the cause.
 
-A gyro is broken if the rates raise an alarm (loop/frame.py asks for it) and the attitude shows no turn for
-it: if
-
-    T <- a T + dA      E <- a E + dt e_T      (|T| - E) / std(T)
-
-exceeds `level` about one axis, no sum above does, and the turns about the other axes are small (`find_gyro`).
-dA, rad, is the turn of a frame beyond that of the gyro; e_T, rad/s, bounds what the constant errors of gyros
-and attitude turn.
+gyro_turn.py finds a gyro that is broken.
 
 A loss acts on roll and yaw together, so an axis i has a `row` in a block of the rates: pitch is row 0 of its
 block, roll is row 0 and yaw row 1 of theirs.
@@ -48,7 +41,6 @@ known accelerations, so z_0 = z, N_0 = N:
     n               number of the inputs: of g, of the constants of the block, and the N_FURTHER
     z_j             leaky sums of g_j; a (m,): their leaks per frame
     M, N_j          correlations with the loss h; b: their leak per frame
-    T, E            leaky sums of dA, and of its bound by constant errors, rad; their leaks are a, too
     a_d             factor of the drift d per frame (`a` of the block)
     blk, row        block of the rates (blocks.py) and row of the axis in it
 """
@@ -66,13 +58,18 @@ from beaver_ftc.diagnosis.detection.blocks import (
     BlockCapacity,
 )
 from beaver_ftc.diagnosis.detection.filters import leak
+from beaver_ftc.diagnosis.detection.gyro_turn import (
+    ANGLES,
+    LEAK_TIMES_S,
+    TURN_FIELDS,
+    configure_turns,
+    find_gyro,
+    sum_turns,
+)
 from beaver_ftc.diagnosis.state import LOSS
 from beaver_ftc.scenario.declared import SensorErrors
 
-ANGLES = ("phi", "theta", "psi")
-LEAK_TIMES_S = (0.1, 0.3, 1.0, 3.0)  # time constants of the leaky sums
 LOSS_MEMORY_S = 30.0  # time constant of the correlations with a loss
-COUPLED_SHARE = 0.05  # largest share of an error of one gyro in the turns about the other axes
 DAMPING_TOLERANCE = 0.2  # relative error of D away from trim
 N_FURTHER = 4  # after the regressors of a block: the bounded uncertainty, and the axis' row of D
 BLOCK_ROWS = (0, 0, 1)  # row of roll, pitch and yaw in the block that has the axis
@@ -92,10 +89,7 @@ def attitude_dtype(capacity: BlockCapacity) -> np.dtype:
         s=(3, n, 3), s_h=(3, n_h, 3),
         n=(int, 3), u=n, tol=(3, n), g=n, xi=3, z=(3, n, n_a), M=(3, n_h), N=(3, n_h, n),
         score=float,  # largest of the sums of both kinds, over their level; 0 in frames that do not need it
-        e_0=3, e_slope=3, tilt=float,  # parts of e_T: rad/s; share of the axis' rate; rad, times all rates
-        T=(3, n_a), E=(3, n_a), T_std=n_a,
-        turn_score=3, gyro=int,  # by axis, over the level; the axis whose gyro is broken, or -1
-        turn_max=float,  # largest |T| that sound gyros explain, rad
+        **TURN_FIELDS,
     )  # fmt: skip
 
 
@@ -103,27 +97,17 @@ def configure_attitude(att: np.void, D: np.ndarray, errors: SensorErrors, margin
     """Fill the comparison at frames of dt_s; D (3, 3) 1/s. margin: difference of log-likelihood ratios that
     names a surface, so the level of the sums is sqrt(2 margin) standard deviations.
 
-        std(T)^2 = 2 v^2 / (1 + a) + (w dt)^2 / (1 - a^2)
-        e_0 = steady + drift      tilt = e_phi + e_theta
-
-    v rad, w rad/s: largest noise of an angle and of a gyro. dA contains the change of an angle's noise, which
-    gives the first term, and dt times the noise of a gyro. steady: constant error of a gyro, rad/s; drift: of
-    the attitude, rad/s; e_phi, e_theta: constant errors of phi and theta, rad.
+    v rad, w rad/s: largest noise of an angle and of a gyro.
     """
-    angles = [errors[name] for name in ANGLES]
-    gyros = [errors[name] for name in AXES]
-    v = max(angle.random for angle in angles)
-    w = max(gyro.random for gyro in gyros)
+    v = errors.each("random", ANGLES).max()
+    w = errors.each("random", AXES).max()
     a = np.exp(-dt_s / np.array(LEAK_TIMES_S))
-    drift = max(abs(getattr(errors.declared, name).drift_rad_s) for name in ANGLES)
     P_start = v**2, w**2, DRIFT_PRIOR_RAD_S2**2
     fill(
-        att, enabled=1, level=sqrt(2.0 * margin), gyro=-1, D=D, R=v**2, a=a, b=exp(-dt_s / LOSS_MEMORY_S),
+        att, enabled=1, level=sqrt(2.0 * margin), D=D, R=v**2, a=a, b=exp(-dt_s / LOSS_MEMORY_S),
         P_start=P_start, P=np.diag(P_start),
-        T_std=np.sqrt(2.0 * v**2 / (1.0 + a) + (w * dt_s) ** 2 / (1.0 - a**2)),
-        e_0=[gyro.steady + drift for gyro in gyros], e_slope=[gyro.slope for gyro in gyros],
-        tilt=angles[0].steady + angles[1].steady,
     )  # fmt: skip
+    configure_turns(att, errors, v, w, dt_s)
 
 
 @kernel
@@ -165,42 +149,6 @@ def compare_attitude(att, blocks, eta, x, dt, detected):
         for i in range(3):
             att.score = max(att.score, largest_sum(att, i))
         find_gyro(att, worst)
-
-
-@kernel
-def sum_turns(att, x, dt):
-    """Advance T and E by a frame of dt s, and fill `turn_score`, the largest over the leaks a of
-
-        (|T| - E) / (T_std level)      T <- a T + dA      E <- a E + dt e_T
-        e_T = e_0 + e_slope |x_i| + tilt (|x_0| + |x_1| + |x_2|)
-
-    x (3,) rad/s: measured rates. Also fill turn_max = max(E + T_std level), rad, over axes and leaks: the
-    largest |T| that sound gyros explain.
-    """
-    rates = abs(x[0]) + abs(x[1]) + abs(x[2])
-    att.turn_max = 0.0
-    for i in range(3):
-        leak(att.T[i], att.a, att.turn[i])
-        leak(att.E[i], att.a, dt * (att.e_0[i] + att.e_slope[i] * abs(x[i]) + att.tilt * rates))
-        att.turn_score[i] = 0.0
-        for m in range(att.a.size):
-            excess = (abs(att.T[i, m]) - att.E[i, m]) / (att.T_std[m] * att.level)
-            att.turn_max = max(att.turn_max, att.E[i, m] + att.T_std[m] * att.level)
-            att.turn_score[i] = max(att.turn_score[i], excess)
-
-
-@kernel
-def find_gyro(att, worst):
-    """Fill `gyro`: the axis whose gyro is broken, or -1. worst: the axis with the largest `turn_score`.
-
-    It is `worst` if the attitude does not turn as that gyro says (turn_score > 1), no sum shows a fault of a
-    surface (score <= 1), and no other axis turns by more than noise or the coupling (COUPLED_SHARE) explain.
-    """
-    if att.turn_score[worst] > 1.0 >= att.score:
-        att.gyro = worst
-        for i in range(3):
-            if i != worst and att.turn_score[i] > max(1.0, COUPLED_SHARE * att.turn_score[worst]):
-                att.gyro = -1
 
 
 @kernel

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from beaver_ftc import compiled
-from beaver_ftc.compiled import cache
-from beaver_ftc.compiled.cache import Wanted
+from beaver_ftc.compiled import ahead
+from beaver_ftc.compiled.ahead import Wanted
 from beaver_ftc.compiled.sized_types import array_type
 
 KINDS = (array_type(np.dtype(float), 1),)
@@ -50,20 +50,20 @@ def how(request, monkeypatch):
     def refused():
         raise OSError("no more processes")
 
-    monkeypatch.setattr(cache, "can_fork", lambda: request.param != "one process")
+    monkeypatch.setattr(ahead, "can_fork", lambda: request.param != "one process")
     if request.param == "a second that is refused":
         monkeypatch.setattr(os, "fork", refused)
     if request.param == "a second that fails":
-        monkeypatch.setattr(cache, "_help", lambda *_: os._exit(3))
+        monkeypatch.setattr(ahead, "_help", lambda *_: os._exit(3))
     return request.param
 
 
 def test_all_are_compiled_and_kept_however_the_second_process_fares(tmp_path, monkeypatch, how):
     fork, second = os.fork, []
     monkeypatch.setattr(os, "fork", lambda: second.append(fork()) or second[-1])
-    assert cache.compile_missing(wanted_of(tmp_path)) == len(BODIES)
+    assert ahead.compile_missing(wanted_of(tmp_path)) == len(BODIES)
     assert kept(tmp_path) == ALL
-    assert cache.compile_missing(wanted_of(tmp_path)) == 0
+    assert ahead.compile_missing(wanted_of(tmp_path)) == 0
     assert agree(tmp_path)
     for each in second:
         with pytest.raises(ChildProcessError):  # no zombie
@@ -71,16 +71,16 @@ def test_all_are_compiled_and_kept_however_the_second_process_fares(tmp_path, mo
 
 
 def test_the_first_missing_kernel_compiles_all_that_are_expected(tmp_path, monkeypatch):
-    monkeypatch.setattr(cache, "can_fork", lambda: False)
+    monkeypatch.setattr(ahead, "can_fork", lambda: False)
     wanted = wanted_of(tmp_path)
-    cache.expect(lambda: wanted[1:])
+    ahead.expect(lambda: wanted[1:])
     assert wanted[0].kernel(np.array([3.0])) == 6.0
     assert kept(tmp_path) == ALL
 
 
 INTERRUPTED = """
 import os, signal, sys, time
-from beaver_ftc.compiled import cache
+from beaver_ftc.compiled import ahead
 class Slow:
     folder, size = "somewhere", 1
     def is_kept(self, kinds): return False
@@ -88,9 +88,9 @@ class Slow:
         os.write(1, f"{os.getpid()}\\n".encode())
         time.sleep(60)
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a job in the background ignores it
-cache.can_fork = lambda: True
-cache.os.dup2 = lambda *_: None
-cache.compile_missing([cache.Wanted(Slow(), ()), cache.Wanted(Slow(), ())])
+ahead.can_fork = lambda: True
+ahead.os.dup2 = lambda *_: None
+ahead.compile_missing([ahead.Wanted(Slow(), ()), ahead.Wanted(Slow(), ())])
 """
 
 

@@ -7,7 +7,7 @@ from types import ModuleType
 import pytest
 
 from beaver_ftc import compiled
-from beaver_ftc.compiled.cache import digest_of
+from beaver_ftc.compiled.digest import digest_of
 
 SOLE = """
 from enum import IntEnum

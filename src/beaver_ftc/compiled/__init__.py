@@ -8,7 +8,7 @@ Compiled code is kept in the user's cache, each kernel under what its code follo
 again what it changes. It also works where the package is read-only. Nobody else may write there: what is
 kept is run.
 
-target.py and sized_types.py use parts of Numba that are known from inside. With a version that is not in
+target.py and what it imports use parts of Numba that are known from inside. With a version that is not in
 `KNOWN`, or with BEAVER_FTC_COMPILER=numba, Numba compiles by its own means, again in each process; flights
 are the same.
 
@@ -28,7 +28,8 @@ from typing import Any
 import numba
 import numpy as np
 
-from beaver_ftc.compiled.cache import BY_ADDRESS
+from beaver_ftc.compiled.digest import BY_ADDRESS
+from beaver_ftc.compiled.interpreted import interpreted
 from beaver_ftc.compiled.records import fill, record, sized
 from beaver_ftc.documents.errors import say_once
 from beaver_ftc.documents.files import cache_of_version, digest_of_files
@@ -75,7 +76,7 @@ def apart(function=None, *, long_loops=False):
     called = kernel(function, for_size=not long_loops)
     if numba.config.DISABLE_JIT or not borrows():
         return called
-    from beaver_ftc.compiled.target import stub
+    from beaver_ftc.compiled.by_address import stub
 
     tag = called.folder.name if called.folder else ""
     caller = stub((function.__module__, function.__qualname__, tag), called)
@@ -105,7 +106,7 @@ def compile_into(folder: Path | None, function, *, for_size=False, allocates=Fal
     With NUMBA_DISABLE_JIT=1 nothing is compiled: the same function, slow, for a debugger.
     """
     if numba.config.DISABLE_JIT:
-        return _interpreted(function)
+        return interpreted(function)
     target = _own_target()
     if target is None:
         return numba.njit(error_model="numpy")(function)
@@ -153,66 +154,6 @@ def _entry_point(function, kinds):
     types = tuple(numba.types.Array(numba.from_dtype(dtype), dimensions, "C") for dtype, dimensions in kinds)
     function.compile(types)
     return function.overloads[types].entry_point
-
-
-def _interpreted(function):
-    """The function as it is, given records whose fields are attributes, as compiled code has them."""
-
-    @functools.wraps(function)
-    def call(*arguments):
-        with np.errstate(all="ignore"):  # as compiled: inf and nan, and no word
-            return function(*map(_with_attributes, arguments))
-
-    call.py_func = function
-    return call
-
-
-_field, _fill = np.void.__getitem__, np.void.__setitem__
-
-
-class _Record(np.void):  # type: ignore[misc]
-    """A record whose fields come before what every scalar of NumPy has, such as `real`."""
-
-    def __getattribute__(self, name):
-        try:
-            return _field(self, name)
-        except (ValueError, KeyError):  # no field
-            return super().__getattribute__(name)
-
-    __setattr__ = _fill
-
-
-@functools.cache
-def _attributed(dtype):
-    """The same type with records whose fields are attributes, at every depth."""
-    if dtype.subdtype:
-        of, shape = dtype.subdtype
-        return np.dtype((_attributed(of), shape))
-    if not dtype.names:
-        return dtype
-    fields = [dtype.fields[name] for name in dtype.names]
-    return np.dtype(
-        (
-            _Record,
-            np.dtype(
-                {
-                    "names": dtype.names,
-                    "formats": [_attributed(of) for of, *_ in fields],
-                    "offsets": [offset for _, offset, *_ in fields],
-                    "itemsize": dtype.itemsize,
-                }
-            ),
-        )
-    )
-
-
-def _with_attributes(argument):
-    """A record, or an array of records, whose fields can be written `record.field`."""
-    if isinstance(argument, (np.ndarray, np.void)):
-        of = argument.dtype
-        if of.names and of.type is not _Record:
-            return argument.view(_attributed(of))
-    return argument
 
 
 Kernel = Callable[..., Any]

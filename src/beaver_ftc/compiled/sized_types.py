@@ -16,7 +16,6 @@ from typing import Any
 
 import numba
 import numpy as np
-from llvmlite import ir
 from numba.core import cgutils, types
 from numba.core.datamodel import models
 from numba.core.imputils import (
@@ -38,12 +37,12 @@ from numba.extending import (
 )
 from numba.np.arrayobj import make_array, populate_array
 
+from beaver_ftc.compiled.asking import WORD, held_value, number_from_python
 from beaver_ftc.compiled.records import Part, Shape, places, shape_of
 
 # mypy: disable-error-code="call-arg,override,attr-defined,misc"
 
 
-WORD = ir.IntType(64)
 _MEMORY, _PLACES = types.CPointer(types.uint8), types.CPointer(types.int64)
 
 
@@ -330,26 +329,6 @@ def _ask(c: Any, kind: Any, argument: Any) -> tuple[Any, Any]:
     asked = held_value(builder, python.pyobj, lambda: python.unserialize(python.serialize_object(ask)))
     address, failed = number_from_python(builder, python, asked, argument)
     return builder.inttoptr(address, WORD.as_pointer()), failed
-
-
-def number_from_python(builder: Any, python: Any, asked: Any, *arguments: Any) -> tuple[Any, Any]:
-    """Code that asks a function of Python for a whole number: that number, or 0, and whether it failed."""
-    found = cgutils.alloca_once_value(builder, WORD(0))
-    answer = python.call_function_objargs(asked, arguments)
-    failed = cgutils.is_null(builder, answer)
-    with cgutils.if_likely(builder, builder.not_(failed)):
-        builder.store(python.long_as_longlong(answer), found)
-        python.decref(answer)
-    return builder.load(found), failed
-
-
-def held_value(builder: Any, kind: Any, make: Callable[[], Any]) -> Any:
-    """Code that loads a value, zero at first; make: code that gives it the first time."""
-    place = cgutils.add_global_variable(builder.module, kind, "held")
-    place.linkage, place.initializer = "internal", ir.Constant(kind, None)
-    with cgutils.if_unlikely(builder, cgutils.is_null(builder, builder.load(place))):
-        builder.store(make(), place)
-    return builder.load(place)
 
 
 @unbox(SizedRecord)

@@ -9,25 +9,18 @@ is only translated; the outermost one is optimised once, with all that it calls 
 nothing, so nobody counts the users of an array; of the steps to machine code, those are taken that change
 something in a kernel (`_Pipeline`).
 
-Kernels that only some flights call are called by their address, each compiled by itself when a flight first
-calls it. The caller holds the address, zero at first; then Python finds or compiles the code. So a flight
-compiles what it uses, and kernels that call the same one share its code.
-
-Records have types that are the same for all sizes: sized_types.py.
-
-All that is borrowed from inside Numba is in these two files, which are used with the versions in
-`beaver_ftc.compiled.KNOWN` alone. With another, kernels are compiled by Numba's own means.
+Kernels that only some flights call are compiled each by itself (by_address.py). Records have types that are
+the same for all sizes (sized_types.py). All that is borrowed from inside Numba is in these three files and
+asking.py, which are used with the versions in `beaver_ftc.compiled.KNOWN` alone. With another, kernels are
+compiled by Numba's own means.
 """
 
 import functools
-import pickle
-import zlib
 from collections.abc import Callable
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from numba.core import cgutils, serialize, sigutils, typed_passes, types, typing, untyped_passes
+from numba.core import sigutils, typed_passes, types, typing, untyped_passes
 from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
 from numba.core.compiler import Compiler, CompilerBase
 from numba.core.compiler_lock import global_compiler_lock
@@ -45,12 +38,13 @@ from numba.core.target_extension import (
 )
 from numba.core.types import unliteral
 from numba.core.utils import threadsafe_cached_property
-from numba.extending import intrinsic, register_model
+from numba.extending import register_model
 
-from beaver_ftc.compiled import cache
-from beaver_ftc.compiled.cache import CodeCache, announced, locked
+from beaver_ftc.compiled.ahead import compile_expected
+from beaver_ftc.compiled.cache import CodeCache, announced, held, locked
+from beaver_ftc.compiled.digest import what_follows
 from beaver_ftc.compiled.records import short_digest
-from beaver_ftc.compiled.sized_types import WORD, held_value, number_from_python, type_of
+from beaver_ftc.compiled.sized_types import type_of
 
 # mypy: disable-error-code="attr-defined,misc,override"
 
@@ -91,7 +85,7 @@ class Library(JITCodeLibrary):
         passes, builder = self._codegen._module_pass_manager()
         passes.run(self._final_module, builder)
         self._final_module.verify()
-        with cache.held():
+        with held():
             self._finalize_final_module()
 
     def _get_module_for_linking(self) -> Any:
@@ -129,76 +123,6 @@ def _all_called(library: Any) -> list[Any]:
 
 class Codegen(JITCPUCodegen):
     _library_class = Library
-
-
-_known: dict[tuple[str, ...], Any] = {}
-
-
-def stub(name: tuple[str, ...], kernel: Any) -> Callable[..., None]:
-    """A function for Numba to compile, which calls this kernel by its address.
-
-    name: module, function, and what else tells the kernel from others. Its arguments are records, arrays and
-    numbers; it returns nothing.
-    """
-    _known[name] = kernel
-    function = kernel.py_func
-    arguments = ", ".join(f"argument_{i}" for i in range(function.__code__.co_argcount))
-    space = {"call": _call(name), "__name__": function.__module__}
-    exec(f"def {function.__name__}({arguments}): call(({arguments},))", space)
-    made: Callable[..., None] = space[function.__name__]
-    return made
-
-
-def _address(name: tuple[str, ...], packed: bytes) -> int:
-    """Where the code of this kernel lies, for arguments of the types packed."""
-    import_module(name[0])
-    kinds = pickle.loads(zlib.decompress(packed))
-    result = _known[name].result(kinds)
-    if result.signature.return_type != types.none:
-        raise TypeError(f"{'.'.join(name)} returns something")
-    with cache.held():
-        where: int = result.library.get_pointer_to_function(result.fndesc.llvm_func_name)
-    return where
-
-
-def _call(name: tuple[str, ...]) -> Any:
-    """What stands for the call in compiled code, to be given the arguments as a tuple."""
-
-    @intrinsic
-    def call(typingctx: Any, arguments: Any) -> Any:
-        def codegen(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-            kinds = tuple(arguments.types)
-            ask = functools.partial(_address, name, zlib.compress(serialize.dumps(kinds)))
-            code = held_value(builder, WORD, lambda: _asked(context, builder, ask))
-            convention = context.call_conv
-            prototype = convention.get_function_type(types.none, kinds)
-            status, _ = convention.call_function(
-                builder,
-                builder.inttoptr(code, prototype.as_pointer()),
-                types.none,
-                kinds,
-                cgutils.unpack_tuple(builder, values[0], len(kinds)),
-            )
-            with cgutils.if_unlikely(builder, status.is_error):
-                convention.return_status_propagate(builder, status)
-            return context.get_dummy_value()
-
-        return types.none(arguments), codegen
-
-    return call
-
-
-def _asked(context: Any, builder: Any, ask: Callable[[], int]) -> Any:
-    """Code that asks Python for an address. An exception ends the call."""
-    python = context.get_python_api(builder)
-    lock = python.gil_ensure()
-    asked = python.unserialize(python.serialize_object(ask))
-    address, failed = number_from_python(builder, python, asked)
-    python.decref(asked)
-    python.gil_release(lock)
-    with cgutils.if_unlikely(builder, failed):
-        context.call_conv.return_exc(builder)
-    return address
 
 
 NAME = "beaver_ftc"  # of the target
@@ -361,7 +285,7 @@ class Kernel(Dispatcher):
         with global_compiler_lock:
             if not compiling and (args in self._inner or not self.is_kept(args)):
                 # Outside the counter: one of these may call this kernel, and would be refused as a recursion.
-                cache.compile_expected()
+                compile_expected()
             with self._compiling_counter:
                 there = self.overloads.get(args)
                 if there is not None and (compiling or args not in self._inner):
@@ -410,7 +334,7 @@ class Kernel(Dispatcher):
     def size(self) -> int:
         """How much its code follows from, in characters."""
         function: Any = self.py_func
-        return len(cache.what_follows(function))
+        return len(what_follows(function))
 
     def compile_unless_taken(self, args: tuple[Any, ...]) -> None:
         """Compile and keep the code, unless it is kept or another process compiles it now."""

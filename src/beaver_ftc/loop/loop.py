@@ -14,7 +14,7 @@ import numpy as np
 
 from beaver_ftc.aircraft.aircraft import EARTH_RADIUS_M
 from beaver_ftc.compiled import direct
-from beaver_ftc.compiled.cache import expect
+from beaver_ftc.compiled.ahead import expect
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.loop import memory
 from beaver_ftc.loop.assembly import Trim, configure_at_trim, configure_design, lay_out
@@ -37,7 +37,7 @@ from beaver_ftc.scenario.signals import sample_frames
 from beaver_ftc.scenario.truth import Truth
 
 if TYPE_CHECKING:
-    from beaver_ftc.compiled.cache import Wanted
+    from beaver_ftc.compiled.ahead import Wanted
     from beaver_ftc.control import Law
     from beaver_ftc.diagnosis import Detector, Verdict
     from beaver_ftc.loop.changing import Changing

@@ -4,7 +4,7 @@ Where a plug-in is between (plugin_frame.py), Python calls the frame's stages on
 arrays, since to look up the type of a whole record costs a call from Python a hundred frames.
 
 Which kernels a flight will call is listed here, and those that are not kept are compiled together
-(compiled/cache.py). Kernels with long code stand first. One that is missing in the list is compiled when it
+(compiled/ahead.py). Kernels with long code stand first. One that is missing in the list is compiled when it
 is first called; one that the flight does not call, because no alarm is raised, is ready for the next flight.
 
 frames (1,): of `frame_dtype` (assembly.py).
@@ -17,7 +17,7 @@ import numpy as np
 from numba import types
 
 from beaver_ftc.compiled import apart, borrows, kernel
-from beaver_ftc.compiled.cache import Wanted
+from beaver_ftc.compiled.ahead import Wanted
 from beaver_ftc.control import CompiledLaw, accommodation, allocation, laws
 from beaver_ftc.control.state import in_charge
 from beaver_ftc.diagnosis.model_prediction import redo_move

@@ -12,7 +12,7 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from typing import Any, Self
 
-from beaver_ftc.compiled.cache import can_fork
+from beaver_ftc.compiled.ahead import can_fork
 from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.studies.engine.processes import cores
 

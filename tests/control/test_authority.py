@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from beaver_ftc.aircraft.schema import ThrustSection
-from beaver_ftc.control import allocation, laws
+from beaver_ftc.control import allocation, authority, laws
 from beaver_ftc.control.laws import reference
 from beaver_ftc.control.probe import advance_probe
 from beaver_ftc.control.thrust import set_up_engine
@@ -34,7 +34,7 @@ def control_record():
 def test_the_attainable_interval_is_spanned_by_the_corners_of_the_travel(row):
     G = np.array([row] * 3)
     corners = [G[1] @ np.array(corner) for corner in product(*zip(LOW, HIGH, strict=True))]
-    least, greatest = allocation.attainable(G, control_record()["layout"], np.zeros((2, 3)), 1)
+    least, greatest = authority.attainable(G, control_record()["layout"], np.zeros((2, 3)), 1)
     assert least == pytest.approx(min(corners), abs=1e-12)
     assert greatest == pytest.approx(max(corners), abs=1e-12)
 

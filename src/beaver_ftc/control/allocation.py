@@ -1,13 +1,8 @@
-"""Allocation: the surfaces that give the demanded angular accelerations, and what they can give at all.
+"""Allocation: the surfaces that give the demanded angular accelerations.
 
 An aircraft with one surface an axis and a stand-in needs a few lines: the lateral pair, the elevator, and the
-hand-over from elevator to flap (`allocate`). Any other set of surfaces is allocated by constrained least
-squares (least_squares.py), started from the frame before (`allocate_generally`); the weight of each surface
-then takes the place of the hand-over.
-
-The attainable moment set is the image of the travels under G [Durham1993]. Here it is the interval that it
-spans on each axis (`attainable`), with the effectiveness of each surface in G. No law can meet a demand
-outside of it.
+hand-over from elevator to flap (`allocate`). general_allocation.py serves any other set of surfaces;
+authority.py computes what surfaces can give at all.
 
 Words for surfaces:
 
@@ -24,14 +19,12 @@ Words for surfaces:
 import numpy as np
 
 from beaver_ftc.aircraft import AXES, Aircraft, main_surface_index_by_axis
-from beaver_ftc.compiled import apart, copy, fill, kernel, record, sized
+from beaver_ftc.compiled import copy, fill, kernel, record, sized
 from beaver_ftc.control.accommodation import usable_effectiveness
-from beaver_ftc.control.least_squares import FREE, LOW, problem_dtype, solve
+from beaver_ftc.control.authority import authority_shares
+from beaver_ftc.control.least_squares import problem_dtype
 from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
 from beaver_ftc.scenario.declared import Declared
-
-RELUCTANT = 1e-4  # least factor on a backup's weight, when nothing is handed over to it; largest: 1 / it
-TINY = 1e-300  # in place of a divisor of zero
 
 
 @sized
@@ -43,7 +36,7 @@ def layout_dtype(n: int) -> np.dtype:
     trim, low, high (n,)  rad, deflection in trim, and stops
     is_backup (n,)        whether a surface waits until pitch is handed over
     authority (3, n)      share of each surface in the authority about each axis; backups have none in pitch
-    general               whether `allocate_generally` is necessary (`_is_general`)
+    general               whether general_allocation.py is necessary (`_is_general`)
     """
     return record(
         main=(int, 3), stand_in=int, trim=n, low=n, high=n, general=int, is_backup=(int, n), authority=(3, n)
@@ -92,7 +85,7 @@ def configure(control: np.void, declared: Declared, travel: np.ndarray) -> None:
         is_backup=[surface in aircraft.stand_ins for surface in aircraft.surfaces],
         general=_is_general(aircraft),
     )  # fmt: skip
-    layout["authority"] = _authority(declared, layout)
+    layout["authority"] = authority_shares(declared, layout)
     step = control["reference"]["config"]["dt"] / declared.control.hand_over_s
     control["allocation"]["config"]["hand_over_step"] = step
 
@@ -102,38 +95,6 @@ def _is_general(aircraft: Aircraft) -> bool:
     leads two axes."""
     several = aircraft.n > len(aircraft.primary) + min(len(aircraft.stand_ins), 1)
     return several or len(aircraft.primary) < len(AXES)
-
-
-def _authority(declared: Declared, layout: np.void) -> np.ndarray:
-    """Share (3, n) of each surface s in the authority about each axis i:
-
-        |G_is| travel_s / their sum        over the surfaces whose largest effect is about this axis
-
-    The surface that leads the axis has the share 1 if the aircraft is not general, or if no surface has its
-    largest effect about the axis. Backups have none in pitch.
-    """
-    aircraft = declared.aircraft
-    shares = np.zeros((3, aircraft.n))
-    if not _is_general(aircraft):
-        shares[range(3), layout["main"]] = 1.0
-        return shares
-    effects = aircraft.effects(declared.scale)
-    for s, (surface, axis) in enumerate(zip(aircraft.surfaces, aircraft.dominant_axis, strict=True)):
-        if axis != PITCH or not layout["is_backup"][s]:
-            travel = aircraft.travel[surface]
-            shares[axis, s] = abs(effects[surface][axis]) * (travel.max_rad - travel.min_rad)
-    for axis, s in enumerate(layout["main"]):
-        shares[axis, s] = shares[axis, s] or float(not shares[axis].any())
-    return shares / shares.sum(axis=1, keepdims=True)
-
-
-@kernel
-def remaining(layout, effectiveness, i):
-    """Remaining share of the authority about axis i, 0 to 1: sum_s authority_is effectiveness_s."""
-    share = 0.0
-    for s in range(effectiveness.size):
-        share += layout.authority[i, s] * effectiveness[s]
-    return share
 
 
 @kernel
@@ -243,68 +204,6 @@ def allocate(axes, output, layout, effectiveness, share, probe):
 
 
 @kernel
-def set_problem(problem, G, layout, effectiveness, prediction, share, probe):
-    """Fill the problem of least_squares.py for this frame: the limits of each surface, rad, the deflection
-    that it prefers, rad, and the weight with which it leaves that, rad2.
-
-        low, high = u -+ reach, within the stops        reach: by the rate limit in a frame, rad
-        u_preferred = trim / E, within the stops        E: effectiveness; trim if E is 0
-        weight = half^2,  of a backup half^2 ratio      half: half the travel, rad
-        ratio = share others / ((1 - share) backups)    within RELUCTANT and 1 / RELUCTANT
-
-    others, backups: sums of half^2 G_pitch^2 over the surfaces that are no backups, and over the backups.
-    G (3, n) rad/s2 per rad; effectiveness (n,); share, probe: as in `pitch`. prediction: u, where the
-    surfaces are, and their actuators; w: length of a JSBSim frame in frames.
-
-    Why this ratio: the backups then give `share` of what pitch demands beyond the trimmed moments. With two
-    surfaces that move pitch alone this is the published hand-over. During a probe the stand-in is held at its
-    trim + probe, and the other surfaces give the rest of the demand.
-    """
-    others, backups, u = 0.0, 0.0, prediction.u
-    for s in range(u.size):
-        reach = prediction.actuators.step[s] / prediction.w
-        half, E = 0.5 * (layout.high[s] - layout.low[s]), effectiveness[s]
-        trim = layout.trim[s] / E if E > 0.0 else layout.trim[s]
-        problem.u_preferred[s] = within_stops(layout, s, trim)
-        problem.weight[s] = half * half
-        problem.low[s] = within_stops(layout, s, u[s] - reach)
-        problem.high[s] = max(min(layout.high[s], u[s] + reach), problem.low[s])
-        moment = half * half * G[PITCH, s] ** 2
-        if layout.is_backup[s]:
-            backups += moment
-        else:
-            others += moment
-    ratio = share * others / max((1.0 - share) * backups, TINY)
-    for s in range(u.size):
-        if layout.is_backup[s]:
-            problem.weight[s] *= min(max(ratio, RELUCTANT), 1.0 / RELUCTANT)
-    if probe != 0.0 and layout.stand_in >= 0:
-        f = layout.stand_in
-        u_probe = min(max(layout.trim[f] + probe, problem.low[f]), problem.high[f])
-        problem.u_preferred[f] = problem.low[f] = problem.high[f] = u_probe
-
-
-@apart
-def allocate_generally(axes, allocation, layout, effectiveness, prediction, share, probe):
-    """Fill the command (n,) rad for any number of surfaces, within stops and rates, by least squares.
-
-    effectiveness (n,); share, probe: as in `pitch`. With several elevators (the main one has less than the
-    whole authority of pitch) the backups take over no more than the share that the elevators have lost.
-    """
-    problem = allocation.memory.problem
-    output = allocation.output
-    remains = remaining(layout, effectiveness, PITCH)
-    if layout.authority[PITCH, layout.main[PITCH]] < 1.0:
-        share = min(share, 1.0 - remains)
-    set_problem(problem, axes.G, layout, effectiveness, prediction, share, probe)
-    solve(problem, axes.G, axes.demand)
-    for s in range(output.command.size):
-        output.command[s], side = problem.u[s], problem.side[s]
-        stop = layout.low[s] if side == LOW else layout.high[s]
-        output.saturated[s] = side != FREE and problem.u[s] == stop
-
-
-@kernel
 def spill_to_flap(axes, output, layout):
     """Give the flap the part of the pitch demand that an elevator at its stop does not give:
 
@@ -344,8 +243,8 @@ def lead_compensate(output, layout, lead, u):
 def hand_over_pitch(allocation, reallocated, at_once, remains, least):
     """Hand the pitch demand over to the flap while it is `reallocated`, else back, by the same step a frame:
 
-        hand_over <- min(hand_over + step, 1), at_once at least 1 - remains      if reallocated
-        hand_over <- max(hand_over - step, 0)                                    otherwise
+        hand_over <- hand_over + step, at_once at least 1 - remains      if reallocated
+        hand_over <- hand_over - step                                    otherwise; within 0 and 1
         lost_share = 1 - remains, or 1 if remains < least
         transfer_share = smoothstep(hand_over) lost_share        smoothstep(1) if nothing remains
 
@@ -353,51 +252,14 @@ def hand_over_pitch(allocation, reallocated, at_once, remains, least):
     the authority in pitch (`remaining`). While pitch is handed back, lost_share stays: the estimate of the
     main surface may return to 1 in one frame, but the command must not jump.
     """
-    config, output = allocation.config, allocation.output
-    if reallocated:
-        output.hand_over = min(output.hand_over + config.hand_over_step, 1.0)
-        if at_once:
-            output.hand_over = max(output.hand_over, 1.0 - remains)
-    else:
-        output.hand_over = max(output.hand_over - config.hand_over_step, 0.0)
+    output, step = allocation.output, allocation.config.hand_over_step
+    output.hand_over = min(max(output.hand_over + (step if reallocated else -step), 0.0), 1.0)
+    if reallocated and at_once:
+        output.hand_over = max(output.hand_over, 1.0 - remains)
     progress = output.hand_over if remains > 0.0 else 1.0
     if reallocated or remains <= 0.0:
         output.lost_share = 1.0 - remains if remains >= least else 1.0
     output.transfer_share = smoothstep(progress) * output.lost_share
-
-
-@kernel
-def attainable(G, layout, engine_authority, i):
-    """Least and greatest acceleration of axis i, rad/s2, within the travel [Durham1993]:
-
-        sum_s min(G_is low_s, G_is high_s),    sum_s max(G_is low_s, G_is high_s)
-
-    G (3, n); engine_authority (2, 3) rad/s2: what engines give at least and at most, added to both.
-    """
-    least, greatest = engine_authority[0, i], engine_authority[1, i]
-    for s in range(layout.low.size):
-        at_low, at_high = G[i, s] * layout.low[s], G[i, s] * layout.high[s]
-        least += min(at_low, at_high)
-        greatest += max(at_low, at_high)
-    return least, greatest
-
-
-@kernel
-def note_shortfall(axes, command, layout, lag, engine_authority):
-    """Fill the shortfall of the command u (n,) rad, and `beyond`, whether `hold` is not attainable:
-
-        shortfall = demand - G (u + lag),    rad/s2
-
-    lag (n,) rad: position of a slow surface less that of a healthy one; engine_authority: as in `attainable`.
-    """
-    G = axes.G
-    for i in range(3):
-        acceleration = 0.0
-        for s in range(command.size):
-            acceleration += G[i, s] * (command[s] + lag[s])
-        axes.shortfall[i] = axes.demand[i] - acceleration
-        least, greatest = attainable(G, layout, engine_authority, i)
-        axes.beyond[i] = not least <= axes.hold[i] <= greatest
 
 
 @kernel

@@ -37,7 +37,7 @@ autopilot_setup.py has the record and fills it; profile.py has the commands.
 import numpy as np
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.control.allocation import attainable, remaining
+from beaver_ftc.control.authority import attainable, remaining
 from beaver_ftc.control.envelope_protection import limit_airspeed_to_fly
 from beaver_ftc.control.power import ceiling
 from beaver_ftc.control.profile import (
@@ -162,7 +162,7 @@ def limit_rates_and_bank(autopilot, layout, G, hold, engine_authority):
         lost = max(BANK_LOST_WITH_ROLL roll_loss_share, BANK_LOST_WITH_YAW yaw_loss_share)
 
     G (3, n): with the effectiveness of each in it; hold (3,) rad/s2; least, greatest, engine_authority: as in
-    `allocation.attainable`.
+    `authority.attainable`.
     """
     rate, gain, roll_loss = autopilot.rate_limit, autopilot.gain, autopilot.roll_loss_share
     for i in range(3):

@@ -26,7 +26,7 @@ import numpy as np
 from beaver_ftc.aircraft.schema import MAX_EFFECTORS
 from beaver_ftc.compiled import apart, fill, kernel, record
 from beaver_ftc.control import least_squares, row_of
-from beaver_ftc.control.allocation import remaining
+from beaver_ftc.control.authority import remaining
 from beaver_ftc.control.least_squares import problem_dtype
 from beaver_ftc.control.power import WHOLE_RANGE_S
 from beaver_ftc.control.thrust import ENGINE, gained, look_up, power_for, set_up_engine
@@ -85,7 +85,7 @@ def effects_of_engines(declared: Declared) -> np.ndarray:
 @kernel
 def surface_reaches_demand(layout, saturated, surfaces, i):
     """Whether the surface that leads axis i is not at its stop, and the surfaces of the axis keep
-    `least_effectiveness` of its authority (`allocation.remaining`); saturated (surfaces,): whether each is at
+    `least_effectiveness` of its authority (`authority.remaining`); saturated (surfaces,): whether each is at
     its stop."""
     given_up = remaining(layout, surfaces.output.effectiveness, i) < surfaces.config.least_effectiveness
     return not given_up and saturated[layout.main[i]] == 0

@@ -34,7 +34,7 @@ from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.aircraft.schema import MAX_LEVERS
 from beaver_ftc.compiled import fill, kernel, record
 from beaver_ftc.control import row_of
-from beaver_ftc.control.allocation import remaining
+from beaver_ftc.control.authority import remaining
 from beaver_ftc.design.engine import engine_power_kw, slipstream
 from beaver_ftc.design.table import AIRSPEED, DPT, QDYN
 from beaver_ftc.diagnosis.state import PITCH, YAW

@@ -18,7 +18,8 @@ from numba import types
 
 from beaver_ftc.compiled import apart, borrows, kernel
 from beaver_ftc.compiled.ahead import Wanted
-from beaver_ftc.control import CompiledLaw, accommodation, allocation, laws
+from beaver_ftc.control import CompiledLaw, accommodation, laws
+from beaver_ftc.control.general_allocation import allocate_generally
 from beaver_ftc.control.state import in_charge
 from beaver_ftc.diagnosis.model_prediction import redo_move
 from beaver_ftc.diagnosis.schemes import detection_share as largest_statistic
@@ -175,7 +176,7 @@ def _of_the_law(frame: np.void) -> Iterator[Any]:
     yield from (law.accommodate or accommodation.accommodate, law.command)
     yield from (laws.prepare, laws.command_surfaces, laws.complete)
     if control["layout"]["general"]:
-        yield allocation.allocate_generally
+        yield allocate_generally
     if frame["autopilot"]["enabled"]:
         yield whole.fly_profile
 

@@ -16,8 +16,9 @@ at fault:
 """
 
 from beaver_ftc.compiled import apart
-from beaver_ftc.control import accommodation, allocation, engines, power
+from beaver_ftc.control import accommodation, allocation, authority, engines, power
 from beaver_ftc.control.accommodation import MODE_REALLOCATED
+from beaver_ftc.control.general_allocation import allocate_generally
 from beaver_ftc.control.probe import advance_probe
 from beaver_ftc.design.table import AIRSPEED
 from beaver_ftc.diagnosis.state import PITCH
@@ -36,7 +37,7 @@ def prepare(control, assessment, prediction, mode, t):
     surfaces, config = control.surfaces, control.config
     output, least = surfaces.output, surfaces.config.least_effectiveness
     allocation.form_effectiveness_matrix(control.axes, prediction.G, surfaces, config.uses_verdict)
-    remains = allocation.remaining(control.layout, output.effectiveness, PITCH)
+    remains = authority.remaining(control.layout, output.effectiveness, PITCH)
     given_up = remains < least and assessment.diagnoses_all_types
     at_once = control.reference.memory.active or output.authority_lost or given_up
     allocation.hand_over_pitch(control.allocation, mode == MODE_REALLOCATED, at_once, remains, least)
@@ -63,9 +64,7 @@ def command_surfaces(control, assessment, faults, prediction, by_observer):
     share = out.transfer_share if by_observer else allocation.smoothstep(out.hand_over)
     probe = control.probe.memory.deflection
     if layout.general:
-        allocation.allocate_generally(
-            axes, control.allocation, layout, effectiveness, prediction, share, probe
-        )
+        allocate_generally(axes, control.allocation, layout, effectiveness, prediction, share, probe)
     else:
         allocation.allocate(axes, out, layout, effectiveness, share, probe)
         if by_observer and uses_verdict and assessment.detected:
@@ -85,7 +84,7 @@ def complete(control, assessment, measured, t):
     power_stage, engine_stage = control.power, control.engines
     config, output = engine_stage.config, engine_stage.output
     engines_serve = assessment.detected or control.config.informed
-    allocation.note_shortfall(axes, out.command, layout, surfaces.output.lag, output.authority)
+    authority.note_shortfall(axes, out.command, layout, surfaces.output.lag, output.authority)
     if power_stage.config.enabled:
         lost = power.pitch_is_lost(layout, surfaces, out.saturated, axes.shortfall)
         power.steer_by_power(power_stage, control.reference, measured.x, measured.y, engines_serve, lost, t)

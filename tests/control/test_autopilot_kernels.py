@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.control.autopilot import acceleration_per_power, path_angle_limits
 from beaver_ftc.control.autopilot_setup import AUTOPILOT
 from beaver_ftc.control.profile import SPEED
+from beaver_ftc.control.vertical_loops import acceleration_per_power, path_angle_limits
 from beaver_ftc.design.table import DPT, QDYN
 from law_records import new_control
 

@@ -39,6 +39,7 @@ AUTOPILOT = record(
     enabled=int,  # whether the scenario has a profile
     flying=int,  # whether the autopilot has taken over
     dt=float,  # s, length of a frame
+    gain=GAIN,
     # Profile (profile.py), in SI and rad, by channel: its legs. A leg whose value is NaN keeps the command.
     n_legs=(int, N_CHANNELS), next_leg_index=(int, N_CHANNELS),
     leg_starts_at_s=(N_CHANNELS, MAX_LEGS), leg_value=(N_CHANNELS, MAX_LEGS),
@@ -71,7 +72,6 @@ AUTOPILOT = record(
     engines_alone_yaw_share=float,  # share of the last BY_POWER_S in which engines alone act in yaw
     # Output
     rates=3,  # p, q, r to fly, rad/s
-    gain=GAIN,  # configuration: GAINS, by autopilot_setup.py
     sets_power=int, power_setting=float,  # whether the autopilot sets the engine now, and to what
     power_airspeed=float,  # m/s, to hold while power stands in for a lost pitch
     airspeed_to_fly=float, airspeed_to_fly_rate=float,  # m/s; its rate of change, m/s2

@@ -7,7 +7,7 @@ import beaver_ftc as bf
 from beaver_ftc.aircraft import load
 from beaver_ftc.control import envelope_protection as holding
 from beaver_ftc.control.autopilot_setup import AUTOPILOT
-from beaver_ftc.control.envelope_protection import elevator_needed
+from beaver_ftc.control.level_flight import elevator_needed
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.metrics import measure, metrics
 from beaver_ftc.results.verdict import verdict_lines

@@ -9,7 +9,8 @@ from scipy.optimize import root
 from beaver_ftc.aircraft import load
 from beaver_ftc.control import autopilot_setup
 from beaver_ftc.control.autopilot_setup import AUTOPILOT
-from beaver_ftc.control.envelope_protection import N_FLAP, N_QDYN, elevator_needed
+from beaver_ftc.control.envelope_protection import N_FLAP, N_QDYN
+from beaver_ftc.control.level_flight import elevator_needed
 from beaver_ftc.control.state import control_dtype
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario

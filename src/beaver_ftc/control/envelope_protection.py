@@ -1,12 +1,6 @@
 """Envelope protection: the airspeeds that can be held with the remaining authority of the surfaces.
 
-Level flight of the design model takes an elevator that depends on dynamic pressure and flap
-(`elevator_needed`):
-
-    qdyn S CX = m g sin alpha,   qdyn S CZ + m g cos alpha = 0,   Cm = 0
-
-in angle of attack, slipstream and elevator: wings level, no rates, no sideslip, the engine free. S m2: wing
-area; m kg: mass; g m/s2: gravity.
+Level flight takes an elevator that depends on dynamic pressure and flap (level_flight.py).
 
 The *acting elevator*, rad, is the deflection of a healthy elevator that would give the pitch moments that
 there are (`average_acting_elevator`):
@@ -23,15 +17,13 @@ fly with, makes up for the rest (`find_airspeeds_that_can_be_held`). The airspee
 these to the commanded one. No law can hold an airspeed for which elevator and flap do not suffice.
 """
 
-from functools import lru_cache
 from math import radians
 
 import numpy as np
 
-from beaver_ftc.aircraft import Aircraft
-from beaver_ftc.aircraft.aircraft import GRAVITY_MPS2
 from beaver_ftc.compiled import fill, kernel, record
 from beaver_ftc.control.allocation import within_stops
+from beaver_ftc.control.level_flight import THRUST, elevator_needed
 from beaver_ftc.control.profile import SPEED, clamp
 from beaver_ftc.control.thrust import between
 from beaver_ftc.design.engine import SEA_LEVEL_DENSITY_KG_M3
@@ -48,12 +40,6 @@ MOST_BANK_DEG = 30.0  # largest bank of a healthy aircraft
 FLAP_RESERVE_DEG = 0.7
 # Largest rate at which a limit moves the airspeed to fly: about as fast as drag slows the aircraft.
 MAX_AIRSPEED_RATE_MPS2 = 1.0
-THRUST = "dpt"  # the signal that stands for the engine
-STEP = 1e-30  # of a complex step: far below rounding, so the derivative is exact to rounding
-ITERATIONS, CLOSE = 12, 1e-9  # of Newton's method; imbalance of a coefficient that counts as zero
-# Largest angle of attack and slipstream: beyond them the polynomials have solutions that no aircraft flies.
-STEEPEST_RAD, MOST_THRUST = 0.5, 3.0
-PER_FLAP, GUESS = -0.12, (0.1, 0.5, 0.0)  # start: slope of alpha over flap; alpha, slipstream, elevator
 
 FASTEST, SLOWEST, BANK_LIMIT = range(3)  # the limits, as indices of in_force, from_s and value
 N_QDYN, N_FLAP = 12, 5
@@ -75,14 +61,14 @@ HOLDING = record(
 
 
 @kernel
-def limit_airspeed_to_fly(autopilot, layout, surfaces, u, unexplained, y, t):
-    """Set autopilot.airspeed_to_fly of this frame, at t s: the nearest to the commanded airspeed that can be
+def limit_airspeed_to_fly(ap, layout, surfaces, u, unexplained, y, t):
+    """Set ap.airspeed_to_fly of this frame, at t s: the nearest to the commanded airspeed that can be
     held. Any airspeed counts as one that can, without a table, while elevator and flap have their whole
     effectiveness, and in the first HOLD_SETTLED_S after that.
 
     u (n,) rad: where the surfaces are. unexplained: d / G, rad.
     """
-    holding, e, f = autopilot.holding, layout.main[PITCH], layout.stand_in
+    holding, e, f = ap.holding, layout.main[PITCH], layout.stand_in
     holding.fastest, holding.slowest = np.inf, 0.0
     effectiveness = surfaces.output.effectiveness
     E = effectiveness[e]
@@ -90,11 +76,11 @@ def limit_airspeed_to_fly(autopilot, layout, surfaces, u, unexplained, y, t):
     if healthy or not holding.has_table:
         holding.n_averaged_frames = 0
     else:
-        average_acting_elevator(holding, autopilot.dt, surfaces.output.offset[e], E * u[e], unexplained)
-        if holding.n_averaged_frames * autopilot.dt > HOLD_SETTLED_S:
+        average_acting_elevator(holding, ap.dt, surfaces.output.offset[e], E * u[e], unexplained)
+        if holding.n_averaged_frames * ap.dt > HOLD_SETTLED_S:
             find_airspeeds_that_can_be_held(holding, layout, surfaces, y)
-    approach_airspeed_to_fly(autopilot)
-    record_limits_in_force(autopilot, layout.main, effectiveness, t)
+    approach_airspeed_to_fly(ap)
+    record_limits_in_force(ap, layout.main, effectiveness, t)
 
 
 @kernel
@@ -160,36 +146,36 @@ def dynamic_pressure_limit(holding, flap, elevator, limit):
 
 
 @kernel
-def approach_airspeed_to_fly(autopilot):
+def approach_airspeed_to_fly(ap):
     """Move the airspeed to fly towards the nearest to the command that can be held, at most at
     max_airspeed_rate_mps2, so without a bump. Without a limit, it is the command."""
-    holding, command = autopilot.holding, autopilot.command[SPEED]
+    holding, command = ap.holding, ap.command[SPEED]
     target = min(max(command, holding.slowest), holding.fastest)
     if target == command and not holding.limits_airspeed:
-        autopilot.airspeed_to_fly, autopilot.airspeed_to_fly_rate = command, autopilot.command_rate[SPEED]
+        ap.airspeed_to_fly, ap.airspeed_to_fly_rate = command, ap.command_rate[SPEED]
         return
-    step = clamp(target - autopilot.airspeed_to_fly, holding.max_airspeed_rate_mps2 * autopilot.dt)
-    autopilot.airspeed_to_fly += step
-    autopilot.airspeed_to_fly_rate = step / autopilot.dt
-    holding.limits_airspeed = autopilot.airspeed_to_fly != command
+    step = clamp(target - ap.airspeed_to_fly, holding.max_airspeed_rate_mps2 * ap.dt)
+    ap.airspeed_to_fly += step
+    ap.airspeed_to_fly_rate = step / ap.dt
+    holding.limits_airspeed = ap.airspeed_to_fly != command
 
 
 @kernel
-def record_limits_in_force(autopilot, main, effectiveness, t):
+def record_limits_in_force(ap, main, effectiveness, t):
     """Record which limits are in force at t s; main (3,): the surface that leads each axis.
 
     airspeed    if an airspeed is commanded: while the limit changes it by more than NOTED_MPS
     bank        while ailerons or rudder have lost effectiveness, and the limit, smoothed over ACTING_S of
                 this time, is more than NOTED_RAD below that in health
     """
-    holding, command = autopilot.holding, autopilot.command[SPEED]
-    if autopilot.is_commanded[SPEED]:
+    holding, command = ap.holding, ap.command[SPEED]
+    if ap.is_commanded[SPEED]:
         record_limit(holding, FASTEST, holding.fastest, holding.fastest < command - NOTED_MPS, t)
         record_limit(holding, SLOWEST, holding.slowest, holding.slowest > command + NOTED_MPS, t)
     lost = effectiveness[main[ROLL]] < 1.0 or effectiveness[main[YAW]] < 1.0
     if lost:
-        holding.bank += autopilot.dt / ACTING_S * (autopilot.bank_limit - holding.bank)
-    limited = lost and holding.bank < autopilot.max_healthy_bank - NOTED_RAD
+        holding.bank += ap.dt / ACTING_S * (ap.bank_limit - holding.bank)
+    limited = lost and holding.bank < ap.max_healthy_bank - NOTED_RAD
     record_limit(holding, BANK_LIMIT, holding.bank, limited, t)
 
 
@@ -221,43 +207,3 @@ def set_up_level_flight_table(holding: np.void, layout: np.void, declared: Decla
         holding, qdyn=qdyn_pa, flap=flap_rad, has_table=np.isfinite(elevator).all(), elevator=elevator,
         max_airspeed_rate_mps2=MAX_AIRSPEED_RATE_MPS2, flap_reserve=radians(FLAP_RESERVE_DEG),
     )  # fmt: skip
-
-
-@lru_cache(maxsize=32)
-def elevator_needed(
-    aircraft: Aircraft,
-    surfaces: tuple[str, str],
-    mass_kg: float,
-    scale: tuple[tuple[str, float], ...],
-    qdyn_pa: tuple[float, ...],
-    flap_rad: tuple[float, ...],
-) -> np.ndarray:
-    """Deflection (n, m) rad for level flight at qdyn (n,) Pa and flap (m,) rad; not a number where there is
-    none.
-
-    Newton's method, z <- z - J^-1 F, for all n m points at once: z (n m, 3) = (alpha, slipstream, elevator),
-    F = (CX - load sin alpha, CZ + load cos alpha, Cm), load = m g / (qdyn S), J = dF/dz by complex steps.
-
-    surfaces: names of elevator and flap. scale: factors of the designer on single terms. All signals that are
-    not named here are 0.
-    """
-    q, flap = (values.ravel() for values in np.meshgrid(qdyn_pa, flap_rad, indexing="ij"))
-    load = mass_kg * GRAVITY_MPS2 / (q * aircraft.geometry.wing_area_m2)
-    neutral = {factor: 0.0 for term in aircraft.terms.values() for factor in term.factors}
-    ratio = dict(scale)
-
-    def imbalance(unknown: np.ndarray) -> np.ndarray:
-        """F (n m, 3) at z (n m, 3)."""
-        alpha, thrust, elevator = unknown.T
-        signals = neutral | {"alpha": alpha, THRUST: thrust, surfaces[0]: elevator, surfaces[1]: flap}
-        CX, CZ, Cm = (aircraft.coefficient(name, signals, ratio) for name in ("CX", "CZ", "Cm"))
-        return np.stack([CX - load * np.sin(alpha), CZ + load * np.cos(alpha), Cm], -1)
-
-    unknown = np.tile(GUESS, (q.size, 1))
-    unknown[:, 0] += PER_FLAP * flap
-    for _ in range(ITERATIONS):
-        slopes = [imbalance(unknown + 1j * STEP * e).imag / STEP for e in np.eye(3)]
-        unknown = unknown - np.linalg.solve(np.stack(slopes, -1), imbalance(unknown)[..., None])[..., 0]
-    solved = np.abs(imbalance(unknown)).max(axis=1) < CLOSE
-    flyable = (np.abs(unknown[:, 0]) < STEEPEST_RAD) & (np.abs(unknown[:, 1]) < MOST_THRUST)
-    return np.where(solved & flyable, unknown[:, 2], np.nan).reshape(len(qdyn_pa), len(flap_rad))

@@ -16,8 +16,8 @@ import numpy as np
 
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.control import flown_by
+from beaver_ftc.control.laws.gain_schedule import STAND_IN
 from beaver_ftc.control.laws.loop_design import margins
-from beaver_ftc.control.laws.rejecting import STAND_IN
 from beaver_ftc.control.readout import DefaultLaw
 from beaver_ftc.design.engine import DPT_0
 from beaver_ftc.design.plain_model import jacobian

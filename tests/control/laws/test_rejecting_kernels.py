@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from beaver_ftc.control import allocation
-from beaver_ftc.control.laws import rejecting
+from beaver_ftc.control.laws import gain_schedule, rejecting
 from beaver_ftc.control.laws.loop_design import lead_of
 from beaver_ftc.control.laws.reference import discretise
 from beaver_ftc.loop.assembly import configure_design
@@ -45,7 +45,7 @@ def record(seed=0):
 def test_the_schedule_is_interpolated_and_held_beyond_its_ends(qdyn, lost):
     control, _ = record()
     config, memory = control["rejecting"]["config"], control["rejecting"]["memory"]
-    rejecting.schedule(config, memory, qdyn, lost)
+    gain_schedule.schedule(config, memory, qdyn, lost)
     for name in ("Kp", "L_rate", "L_disturbance"):
         of = [np.interp(qdyn, config["qdyn"], row) for row in config[f"{name}_at"]]
         expected = [of[0], (1 - lost) * of[1] + lost * of[3], of[2]]

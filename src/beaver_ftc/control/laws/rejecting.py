@@ -16,7 +16,8 @@ is not named yet. u are the positions of the actuators, not their commands. So n
 stops count as a disturbance, and nothing can wind up. The command acts one JSBSim frame from now, and xm is
 taken at that instant too.
 
-Gains. A loop has Kp = s and w_o = RATIO s; loop_design.py derives s, 1/s, from what is declared.
+Gains. A loop has Kp = s and w_o = RATIO s; loop_design.py derives s, 1/s, from what is declared, and
+gain_schedule.py has the table over dynamic pressure.
 
 Effectiveness of a surface at fault. The law takes the diagnosis' estimate, or that from the observer's
 innovation if it is larger (evidence.py), and withdraws a surface that stays at its stop (withdrawal.py). If
@@ -24,12 +25,9 @@ the aircraft has many surfaces, the law estimates all of them at once while an a
 (effectiveness_estimator.py).
 """
 
-from math import exp, sqrt
-
 import numpy as np
 
-from beaver_ftc.aircraft import AXES
-from beaver_ftc.compiled import apart, copy, fill, kernel, record, sized
+from beaver_ftc.compiled import apart, copy, kernel, record, sized
 from beaver_ftc.control import CompiledLaw, accommodation, allocation, laws
 from beaver_ftc.control.accommodation import approach, begin_frame, give_up, start_of, take_offsets
 from beaver_ftc.control.laws.effectiveness_estimator import (
@@ -39,88 +37,12 @@ from beaver_ftc.control.laws.effectiveness_estimator import (
     estimate,
     estimator_dtype,
 )
-from beaver_ftc.control.laws.evidence import (
-    SUMS,
-    accumulate,
-    derive_fading,
-    larger_estimate,
-    restart_at_naming,
-)
-from beaver_ftc.control.laws.loop_design import Loop, corrections, fastest, lead_of
+from beaver_ftc.control.laws.evidence import SUMS, accumulate, larger_estimate, restart_at_naming
+from beaver_ftc.control.laws.gain_schedule import N_LOOPS, N_POINTS, configure, schedule
 from beaver_ftc.control.laws.reference import advance
 from beaver_ftc.control.laws.withdrawal import is_doubtful, is_replaced, withdraw
-from beaver_ftc.control.thrust import between
-from beaver_ftc.design.plain_model import effectiveness as control_effectiveness
-from beaver_ftc.design.plain_model import own_damping
-from beaver_ftc.design.table import AIRSPEED, QDYN
-from beaver_ftc.diagnosis.model_prediction import DEFAULT_RATE_RAD_S, servo_data
-from beaver_ftc.diagnosis.state import PITCH
+from beaver_ftc.design.table import QDYN
 from beaver_ftc.diagnosis.types import GIVE_UP
-from beaver_ftc.scenario.declared import Declared
-from beaver_ftc.scenario.sensors import RateGyro
-
-N_POINTS = 5  # points of the schedule over dynamic pressure
-N_LOOPS = 4  # rows of the tables of gains: roll, pitch, yaw, and pitch by the surface that stands in
-STAND_IN = 3  # the last of these rows
-
-
-def configure(law: np.void, control: np.void, prediction: np.void, declared: Declared, y: np.ndarray) -> None:
-    """Fill the law's configuration (control.CompiledLaw; fields: `config_dtype`) in three steps:
-
-        1  the lead of each surface, which goes the share `approach` of the way to its command in a frame
-        2  the loops, each an axis with the surface s that moves it: roll, pitch, yaw and, if a surface can
-           stand in, pitch by that surface; this order is that of the rows of the tables of gains
-        3  the gains of each loop at each point of the schedule: the fastest Kp that margins and noise allow
-
-    y (n_y,): the signals measured in trim. G (points, 3, n) rad/s2 per rad. keep: pole of a gyro's lag over a
-    frame, exp(-bandwidth dt); 0 for a gyro without lag.
-    """
-    config, layout, design = law["config"], control["layout"], prediction["design"]
-    dt, share = 1.0 / declared.rate_hz, 1.0 / declared.substeps
-    points = schedule_points(declared, y)  # step 1
-    G = np.array([control_effectiveness(design, point) for point in points])
-    approach = 1.0 - (1.0 - prediction["actuators"]["approach"]) ** declared.substeps
-    lead = [lead_of(float(share_of_way)) for share_of_way in approach]
-    fill(config, dt=dt, share=share, qdyn=points[:, QDYN], fading=derive_fading(dt), lead=lead)
-    loops = list(enumerate(layout["main"].tolist()))  # step 2
-    if layout["stand_in"] >= 0:
-        loops.append((PITCH, int(layout["stand_in"])))
-    speed_rad_s = allowed_speeds(declared, loops, np.abs(own_damping(design, y)))
-    margin = declared.control.gain_margin_db, declared.control.phase_margin_deg
-    for row, (axis, s) in enumerate(loops):  # step 3
-        gyro: RateGyro = getattr(declared.instruments, AXES[axis])
-        keep = exp(-gyro.bandwidth_rad_s * dt) if gyro.bandwidth_rad_s else 0.0
-        loop = Loop(dt, share, float(approach[s]), config["lead"][s], gyro.delay_s, keep)
-        for j in range(N_POINTS):
-            Kp = fastest(loop, margin, gyro.random_error, float(G[j, axis, s]), speed_rad_s[s])
-            config["Kp_at"][row, j] = Kp
-            config["L_rate_at"][row, j], config["L_disturbance_at"][row, j] = corrections(Kp, dt)
-
-
-def allowed_speeds(declared: Declared, loops: list[tuple[int, int]], D: np.ndarray) -> dict[int, float]:
-    """The speed, rad/s, at which the noise of a gyro may move the surface s of each loop (axis, s):
-
-        noise_share sqrt(D_axis / D_max) rate limit        D (3,) 1/s: own damping of the axes; D_max: largest
-
-    A surface that leads two axes has the speed of the second one.
-    """
-    limits_rad_s = servo_data(declared)["rate_limit_rad_s"]
-    return {
-        s: declared.control.noise_share
-        * sqrt(D[axis] / D.max())
-        * float(limits_rad_s[s] or DEFAULT_RATE_RAD_S)
-        for axis, s in loops
-    }
-
-
-def schedule_points(declared: Declared, y: np.ndarray) -> np.ndarray:
-    """The signals at the points of the schedule, (N_POINTS, n_y): those in trim, y (n_y,), except airspeed V
-    m/s, which spans the envelope, and dynamic pressure, Pa, which goes with V^2."""
-    points = np.tile(y, (N_POINTS, 1))
-    points[:, AIRSPEED] = V = np.linspace(*declared.aircraft.envelope.airspeed_mps, N_POINTS)
-    points[:, QDYN] = y[QDYN] * (V / y[AIRSPEED]) ** 2
-    return points
-
 
 # xhat and d: rate (3,) rad/s, disturbance (3,) rad/s2. begun: whether the observer has begun. `begin` takes
 # this record over from the law before.
@@ -221,27 +143,6 @@ def command(control, assessment, faults, prediction, measured, mode, t):
     laws.complete(control, assessment, measured, t)
     config = control.rejecting.config
     allocation.lead_compensate(control.allocation.output, control.layout, config.lead, prediction.u)
-
-
-@kernel
-def schedule(config, memory, qdyn, transfer_share):
-    """Fill the gains (3,) of the axes at a dynamic pressure qdyn, Pa; beyond the schedule, take those at its
-    end. In pitch
-
-        gain <- gain + transfer_share (gain of the stand-in - gain)
-
-    transfer_share: the part of pitch that the stand-in carries.
-    """
-    for table, gains in (
-        (config.Kp_at, memory.Kp),
-        (config.L_rate_at, memory.L_rate),
-        (config.L_disturbance_at, memory.L_disturbance),
-    ):
-        for i in range(3):
-            gains[i] = between(qdyn, N_POINTS, config.qdyn, table[i])
-        if transfer_share > 0.0:
-            by_stand_in = between(qdyn, N_POINTS, config.qdyn, table[STAND_IN])
-            gains[PITCH] += transfer_share * (by_stand_in - gains[PITCH])
 
 
 @kernel

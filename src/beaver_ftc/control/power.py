@@ -26,7 +26,6 @@ aircraft, but cannot make it follow a pitch rate.
 """
 
 from math import exp, radians
-from typing import Any
 
 import numpy as np
 
@@ -35,21 +34,20 @@ from beaver_ftc.aircraft.schema import MAX_LEVERS
 from beaver_ftc.compiled import fill, kernel, record
 from beaver_ftc.control import row_of
 from beaver_ftc.control.authority import remaining
-from beaver_ftc.design.engine import engine_power_kw, slipstream
-from beaver_ftc.design.table import AIRSPEED, DPT, QDYN
-from beaver_ftc.diagnosis.state import PITCH, YAW
+from beaver_ftc.control.slipstream_limit import ceiling, slipstream_limits
+from beaver_ftc.design.table import AIRSPEED
+from beaver_ftc.diagnosis.state import PITCH
 from beaver_ftc.scenario.declared import Declared
 
 LEAST_LACK_RAD_S2 = 0.05  # smallest shortfall in pitch that counts: 2 to 3 inHg give so much
 WHOLE_RANGE_S = 5.0  # time in which a lever goes from stop to stop; manifold pressure has `rate_inhg_s`
-YAW_SHARE = 0.5  # share of the rudder's travel that engine power may need; the rest is there to fly with
 
 # enabled                      whether the law may use the engine (`is_at_hand`)
 # impatience, forgiveness      changes of `lost` in a frame (`engage`)
 # speed_gain, attitude_gain    K_V, K_theta
 # smoothing, washout, leak     1 - exp(-dt / tau) of the lag of V, of V_bar and of theta_m
 # trim, low, high, step        setting in trim, its range, and its largest change in a frame
-# dpt_factor, highest_dpt      see `_slipstream_limits`; 0 if there is no slipstream to account for
+# dpt_factor, highest_dpt      see slipstream_limit.py; 0 if there is no slipstream to account for
 POWER_CONFIG = record(
     enabled=int, impatience=float, forgiveness=float, speed_gain=float, attitude_gain=float,
     smoothing=float, washout=float, leak=float, trim=float, low=float, high=float, step=float,
@@ -73,8 +71,8 @@ def is_at_hand(declared: Declared) -> bool:
     """Whether the declared built-in law may use the engine: the scenario allows it, the engine is known, and
     the law is informed, or it reallocates, may pitch by power, and receives the diagnosis of all types."""
     law = row_of(declared.control.law)
-    diagnoses_all_types = declared.fdi.fault_class == "all" and law.pitch_by_power
-    may_use = declared.control.power.enabled and (law.informed or (law.reallocates and diagnoses_all_types))
+    may_pitch = law.reallocates and law.pitch_by_power and declared.fdi.fault_class == "all"
+    may_use = declared.control.power.enabled and (law.informed or may_pitch)
     return may_use and _has_piston_engine(declared.aircraft)
 
 
@@ -86,7 +84,6 @@ def _has_piston_engine(aircraft: Aircraft) -> bool:
 def configure_power(power: np.void, layout: np.void, declared: Declared) -> None:
     """Fill the record (dtype POWER); layout: of the surfaces."""
     settings, dt, config = declared.control.power, 1.0 / declared.rate_hz, power["config"]
-    initial: Any = declared.initial  # the keys of its engine differ between aircraft
     lags_s = settings.smoothing_s, settings.washout_s, settings.attitude_memory_s
     smoothing, washout, leak = (1.0 - exp(-dt / lag_s) for lag_s in lags_s)
     fill(
@@ -100,42 +97,16 @@ def configure_power(power: np.void, layout: np.void, declared: Declared) -> None
     if name_and_setting is None:
         return
     name, setting = name_and_setting
-    trim = getattr(initial, name)
+    trim = getattr(declared.initial, name)
     power["setpoint"]["base"] = power["output"]["command"][0] = trim
     fill(power["output"], least=trim, greatest=trim)
     low, high = setting.range
     per_s = (high - low) / WHOLE_RANGE_S
     if _has_piston_engine(declared.aircraft):
         low, high = min(settings.lowest_inhg, trim), max(settings.highest_inhg, trim)
-        config["dpt_factor"], config["highest_dpt"] = _slipstream_limits(declared, layout)
+        config["dpt_factor"], config["highest_dpt"] = slipstream_limits(declared, layout)
         per_s = settings.rate_inhg_s
     fill(config, trim=trim, low=low, high=high, step=per_s * dt)
-
-
-def _slipstream_limits(declared: Declared, layout: np.void) -> tuple[float, float]:
-    """Two values of the slipstream. dpt_factor = rho V^3 d dpt / d P of the engine [FDC], kg/m3 (m/s)^3 per
-    inHg: constant at a given rpm, so it is computed at rho = 1 kg/m3 and V = 1 m/s. highest_dpt: the dpt at
-    which holding the propeller's yawing moment takes YAW_SHARE of the rudder's travel, rad:
-
-        |Cn_dpt3| dpt^3 = YAW_SHARE |Cn_dr| rudder_rad
-
-    Cn_dr: sum over the terms of all surfaces that move mainly yaw, without signals; rudder_rad: the travel of
-    the rudder to its nearer stop. highest_dpt is infinite if the propeller has no yawing moment.
-    """
-    initial: Any = declared.initial
-    aircraft, rudder = declared.aircraft, layout["main"][YAW]
-    rpm, terms = initial.engine_rpm, aircraft.terms.values()
-    rudders = {s for s, axis in zip(aircraft.surfaces, aircraft.dominant_axis, strict=True) if axis == YAW}
-    per_rad = sum(
-        declared.terms[t.name] for t in terms if t.coefficient == "Cn" and not t.of and t.surface in rudders
-    )
-    of_slipstream = sum(
-        declared.terms[t.name] for t in terms if t.coefficient == "Cn" and t.of == (("dpt", 3),)
-    )
-    kw_per_inhg = engine_power_kw(rpm, 1.0, 1.0) - engine_power_kw(rpm, 0.0, 1.0)
-    rudder_rad = min(-layout["low"][rudder], layout["high"][rudder])
-    dpt3 = abs(YAW_SHARE * per_rad * rudder_rad / of_slipstream) if of_slipstream else np.inf
-    return slipstream(kw_per_inhg, 1.0, 1.0) - slipstream(0.0, 1.0, 1.0), dpt3 ** (1.0 / 3.0)
 
 
 @kernel
@@ -195,29 +166,14 @@ def follow(config, memory, reference, x, y):
 
 
 @kernel
-def ceiling(power, y, highest_dpt):
-    """Highest manifold pressure, inHg, whose slipstream leaves the rudder enough travel to fly with:
-
-        P + (highest_dpt - dpt) / (d dpt / d P),    d dpt / d P = dpt_factor / (2 qdyn V)
-
-    The propeller yaws with dpt^3. In slow flight at full power this is more than the rudder can hold. Without
-    a slipstream (dpt_factor 0) there is no limit.
-    """
-    if power.config.dpt_factor == 0.0:
-        return np.inf
-    per_inhg = power.config.dpt_factor / (2.0 * y[QDYN] * y[AIRSPEED])
-    return power.output.command[0] + (highest_dpt - y[DPT]) / per_inhg
-
-
-@kernel
 def wanted(power, y):
     """The setting that the law wants, inHg: P = base - K_V (V - V_bar) + K_theta theta_m, within `ceiling`
     and its range, while it is engaged; else `base`."""
-    config, memory = power.config, power.memory
-    P, V, V_bar, theta_m = power.setpoint.base, memory.speed, memory.usual_speed, memory.attitude
+    config, memory, P = power.config, power.memory, power.setpoint.base
     if not memory.engaged:
         return P
-    P = P - config.speed_gain * (V - V_bar) + config.attitude_gain * theta_m
+    P -= config.speed_gain * (memory.speed - memory.usual_speed)
+    P += config.attitude_gain * memory.attitude
     return max(min(P, ceiling(power, y, config.highest_dpt), config.high), config.low)
 
 
@@ -232,13 +188,14 @@ def steer_by_power(power, reference, x, y, may_engage, is_lost, t):
     follow(power.config, memory, reference, x, y)
     if may_engage:
         engage(power, is_lost, t)
-    output.command[0] = moved(output.command[0], wanted(power, y), power.config.step)
+    P = moved(output.command[0], wanted(power, y), power.config.step)
+    output.command[0] = P
     output.in_use = memory.engaged or memory.moved
-    memory.moved = output.command[0] != power.setpoint.base
+    memory.moved = power.setpoint.base != P
     if output.in_use:
         output.frames += memory.engaged
-        output.least = min(output.least, output.command[0])
-        output.greatest = max(output.greatest, output.command[0])
+        output.least = min(output.least, P)
+        output.greatest = max(output.greatest, P)
 
 
 @kernel

@@ -20,8 +20,8 @@ Other letters: autopilot.py.
 import numpy as np
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.control.power import ceiling
 from beaver_ftc.control.profile import ALTITUDE, SPEED, clamp
+from beaver_ftc.control.slipstream_limit import ceiling
 from beaver_ftc.control.thrust import gained, look_up, power_for, thrust_per_inhg
 from beaver_ftc.design.table import ALPHA
 from beaver_ftc.diagnosis.state import PITCH, ROLL

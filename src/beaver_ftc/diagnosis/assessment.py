@@ -22,10 +22,10 @@ from beaver_ftc.diagnosis.types import (
     SCALE_COMMAND,
     SUBTRACT_OFFSET,
     WAIT_FOR_SURFACE,
-    last_error,
     modes,
     verdict,
 )
+from beaver_ftc.diagnosis.types.observations import last_error
 
 # 1 / variance of an effectiveness with a standard deviation of 0.05: precise enough to be applied at once
 MIN_INFORMATION = 400.0

@@ -30,7 +30,7 @@ from beaver_ftc.diagnosis.model_prediction import (
     predict_known,
 )
 from beaver_ftc.diagnosis.monitors import engine_monitor, sensor_monitor
-from beaver_ftc.diagnosis.schemes import record_isolated_surfaces
+from beaver_ftc.diagnosis.schemes.isolated_surfaces import record_isolated_surfaces
 from beaver_ftc.diagnosis.state import PITCH
 from beaver_ftc.diagnosis.types import modes
 from beaver_ftc.loop.accounts import account, add_effect, effect_of_faults, follow_guarantee

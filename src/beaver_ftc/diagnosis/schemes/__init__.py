@@ -14,23 +14,15 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.compiled import apart, fill, kernel, record, sized
-from beaver_ftc.diagnosis import bounds_design, isolation, state
-from beaver_ftc.diagnosis import conclusion as conclusions
+from beaver_ftc.diagnosis import bounds_design, conclusion, isolation, state
 from beaver_ftc.diagnosis.assessment import weighs_statistics
 from beaver_ftc.diagnosis.bounds import bound_dtype
-from beaver_ftc.diagnosis.conclusion import (
-    PLUGIN_DECIDES,
-    SENSOR_BROKEN,
-    SEVERAL_POSSIBLE,
-    SURFACE_REFUTED,
-    TYPES_REFUTED,
-)
 from beaver_ftc.diagnosis.detection import directions, fdae, filters, statistical
 from beaver_ftc.diagnosis.detection.filters import bank_share
 from beaver_ftc.diagnosis.detection.parity import USUAL_SIZE, StatisticalSize
-from beaver_ftc.diagnosis.monitors import engine_monitor, sensor_monitor
+from beaver_ftc.diagnosis.monitors import engine_monitor
 from beaver_ftc.diagnosis.monitors.records import SENSOR_MONITOR_RECORD
-from beaver_ftc.diagnosis.schemes import adaptive_estimators, zhang2005
+from beaver_ftc.diagnosis.schemes import adaptive_estimators, statistical_frame, zhang2005
 from beaver_ftc.diagnosis.state import (
     ADAPTIVE_SCHEME,
     NO_SCHEME,
@@ -40,8 +32,6 @@ from beaver_ftc.diagnosis.state import (
     WORST_CASE_DETECTOR,
 )
 from beaver_ftc.diagnosis.types import records
-from beaver_ftc.diagnosis.types.registry import NAMED, SAME_NAME
-from beaver_ftc.diagnosis.types.verdict import DEDUCED_FAULTY, TYPE_UNDECIDED, any_remains
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.diagnosis import pairs_refused
@@ -53,7 +43,7 @@ def fdi_dtype(n: int, size: StatisticalSize = USUAL_SIZE) -> np.dtype:
     statistical detector's record."""
     return record(
         config=state.SHARED_CONFIG_RECORD, bound=bound_dtype(n, size.n_map_boxes), bank=filters.BANK_RECORD,
-        fdae=fdae.FDAE_RECORD, verdict=conclusions.conclusion_dtype(n), layout=state.layout_dtype(n),
+        fdae=fdae.FDAE_RECORD, verdict=conclusion.conclusion_dtype(n), layout=state.layout_dtype(n),
         isolation=isolation.isolation_dtype(n), types=records.fault_types_dtype(n),
         statistical=statistical.statistical_dtype(size), sensor_monitor=SENSOR_MONITOR_RECORD,
         published=zhang2005.PUBLISHED_RECORD, engine_monitor=engine_monitor.ENGINE_MONITOR_RECORD,
@@ -81,7 +71,7 @@ def configure_diagnosis(fdi: np.void, pred: np.void, declared: Declared, travel:
         zhang2005.reconfigure(fdi, declared, travel)
     records.configure_types(fdi["types"], fdi["layout"], pred["actuators"], declared, travel)
     fdi["types"]["config"]["has_eG"] = fdi["bound"]["has_eG"]
-    conclusions.reset_conclusion(fdi["verdict"])
+    conclusion.reset_conclusion(fdi["verdict"])
 
 
 def prepare_takeover(fdi: np.void, in_flight: bool) -> None:
@@ -95,48 +85,6 @@ def prepare_takeover(fdi: np.void, in_flight: bool) -> None:
         memory = fdi["statistical"][name]["memory"]
         fill(memory, turn_past=in_flight, start_share=in_flight, start_left=in_flight)
     fdi["sensor_monitor"]["substep"] = 0
-
-
-@kernel
-def record_isolated_surfaces(fdi, t):
-    """Record at t s which surfaces are isolated, and the type of each: where pairs are diagnosed, as their
-    status says, else the one surface of the conclusion; none (`void`) once a sensor is found broken, unless
-    the monitor keeps the surface."""
-    conclusion, monitor, pairs = fdi.verdict, fdi.sensor_monitor, fdi.types.pair.enabled
-    void = sensor_monitor.has_alarm(monitor) and not monitor.output.keeps_surface
-    sole = conclusions.isolated_surface(conclusion, fdi.isolation.estimator)
-    for s, surf in enumerate(fdi.types.surface):
-        isolated = surf.status.is_isolated if pairs else s == sole
-        kind = surf.status.fault_type if pairs else conclusion.fault_type
-        reason = SENSOR_BROKEN if void else reason_of_withdrawal(fdi, s, isolated)
-        conclusions.update_interval(
-            conclusion, s, isolated and not void, t, SAME_NAME[kind] if kind >= 0 else -1, reason
-        )
-
-
-@kernel
-def reason_of_withdrawal(fdi, s, isolated):
-    """The reason why the isolation of surface s, or its type, ends in this frame: the first that applies.
-
-    PLUGIN_DECIDES      the scheme is a plug-in
-    SURFACE_REFUTED     the estimator of the surface is excluded (of its position, if all types are
-                        diagnosed, else of its loss)
-    TYPES_REFUTED       all types are diagnosed, and the stored types of the first fault in pitch are
-                        refuted, or no type of the name that it had (any name, if the surface itself is no
-                        longer isolated) remains
-    SEVERAL_POSSIBLE    otherwise
-    """
-    cfg, surf = fdi.config, fdi.types.surface[s]
-    j = fdi.layout.position[s] if cfg.diagnoses_all_types else fdi.layout.loss[s]
-    if cfg.scheme_number == PLUGIN_SCHEME:
-        return PLUGIN_DECIDES
-    if j >= 0 and fdi.isolation.estimator[j].excluded:
-        return SURFACE_REFUTED
-    refuted = s == fdi.types.pair.first_pitch and surf.status.basis == DEDUCED_FAULTY
-    named = fdi.verdict.isolated_type[s] if isolated else TYPE_UNDECIDED
-    if cfg.diagnoses_all_types and (refuted or not any_remains(surf, NAMED[named])):
-        return TYPES_REFUTED
-    return SEVERAL_POSSIBLE
 
 
 @kernel
@@ -188,20 +136,20 @@ def update_verdict(fdi, prediction, measured, t):
 def prepare_next_frame(fdi, prediction, measured, k):
     """Prepare the statistical detector for the frame after frame k."""
     if fdi.statistical.test.enabled and fdi.config.scheme_number != NO_SCHEME:
-        adaptive_estimators.prepare_gusts(fdi, prediction, measured, k)
+        statistical_frame.prepare_gusts(fdi, prediction, measured, k)
 
 
 @kernel
 def accumulate_substep(fdi, prediction, measured):
     """Add one JSBSim frame inside the next frame."""
     if fdi.statistical.test.enabled and fdi.config.scheme_number != NO_SCHEME:
-        adaptive_estimators.add_gust_instant(fdi, prediction, measured)
+        statistical_frame.add_gust_instant(fdi, prediction, measured)
 
 
 def kernels_of_scheme(fdi: np.void) -> Iterator[Any]:
     """The kernels that a flight compiles apart, of its scheme."""
-    cfg = fdi["config"]
-    scheme, ours = cfg["scheme_number"], adaptive_estimators
+    cfg, ours = fdi["config"], adaptive_estimators
+    scheme = cfg["scheme_number"]
     yield begin_scheme
     if scheme == PUBLISHED_SCHEME:
         yield from (zhang2005.advance_estimators_to_frame, zhang2005.update_verdict)
@@ -213,4 +161,4 @@ def kernels_of_scheme(fdi: np.void) -> Iterator[Any]:
         if cfg["exclusion_authority"] != WORST_CASE_DETECTOR:
             yield ours.weigh_position if cfg["diagnoses_all_types"] else ours.weigh_loss
         if fdi["statistical"]["test"]["enabled"]:
-            yield from (ours.update_tests, ours.prepare_gusts)
+            yield from (statistical_frame.update_tests, statistical_frame.prepare_gusts)

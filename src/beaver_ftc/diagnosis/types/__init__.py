@@ -23,16 +23,14 @@ the true fault, if its parameter is constant while it is there, is never exclude
 named. Types that cannot be distinguished stay candidates.
 
 A file under table/ describes one fault type, or several that share their kernels; its `TYPES` are the rows.
-This file says what is in a row (`FaultType`) and has two parts of a surface's record:
-
-- Feasible sets: the set (low, high) of each type's parameter; low > high is the empty set. A type is excluded
-  once its set is empty, and stays excluded until the surface's diagnosis restarts.
-- Observations: where the surface was, if it alone is at fault (or by pairs.py), in three frames or blocks:
-  `last` is of the elapsed frame, `judged` of the one before it, `earlier` of the one before that; rad.
+This file says what is in a row (`FaultType`), and has the feasible sets: the set (low, high) of each type's
+parameter; low > high is the empty set. A type is excluded once its set is empty, and stays excluded until the
+surface's diagnosis restarts.
 
 registry.py reads the rows into arrays, and records.py has the records. In each frame examination.py finds
-where each surface was and tests every type. verdict.py and pairs.py conclude which surface and type it is,
-modes.py what the law does about it, and findings.py puts it in words; they name no type.
+where each surface was (observations.py) and tests every type. verdict.py, and for two faults pairs.py,
+conclude which surface and type it is, modes.py what the law does about it, and findings.py puts it in words;
+they name no type.
 
     s, srf          surface, and its record (`records.surface_types_dtype`)
     h               type: its number, the same in every array over types
@@ -51,15 +49,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from beaver_ftc.compiled import copy, kernel, record
-from beaver_ftc.diagnosis import estimators
+from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis.sets import EMPTY_SET, UNLIMITED_SET, intersect
 
 Kernel = Callable[..., Any]
 
 # Accommodation modes: the law scales the command of a surface at fault, gives the surface up, subtracts its
 # offset, or waits for it at its rate.
-SCALE_COMMAND, GIVE_UP, SUBTRACT_OFFSET, WAIT_FOR_SURFACE = range(4)
+MODES = SCALE_COMMAND, GIVE_UP, SUBTRACT_OFFSET, WAIT_FOR_SURFACE = range(4)
 
 # `evidence_at_rest`: what a frame says of a type if the surface was given up, stays where it was, and nothing
 # is wrong in the frame.
@@ -244,88 +241,3 @@ def intersect_set(srf, h, other):
     put_set(srf, h, intersect((srf.sets.low[h], srf.sets.high[h]), other))
     if srf.sets.low[h] > srf.sets.high[h]:
         srf.sets.excluded[h] = 1
-
-
-# An observation of a surface in a frame:
-# u           where a healthy surface was, rad
-# lo, hi      where this one can have been, rad
-# anomalous   whether more than the declared uncertainty must explain the frame
-# kappa       (G_max - G_min) / (4 |mean G|): a mean weighted by G may be off by kappa times the range of p
-# hides       whether the lower and the upper stop can cut off a deflection without this being visible
-OBSERVATION_RECORD = record(u=float, lo=float, hi=float, anomalous=int, kappa=float, hides=(int, 2))
-
-
-@kernel
-def copy_observation(new, old):
-    """Copy the observation `old` into `new`."""
-    (new.u, new.lo, new.hi, new.anomalous, new.kappa) = (old.u, old.lo, old.hi, old.anomalous, old.kappa)
-    copy(old.hides, new.hides)
-
-
-@kernel
-def set_anomalous(srf, anomalous):
-    """Set `anomalous` of the last observation of a surface."""
-    srf.last.anomalous = anomalous
-
-
-@kernel
-def forget_anomalies(srf):
-    """Set that the declared uncertainty explains all three observations of a surface."""
-    srf.last.anomalous = srf.judged.anomalous = srf.earlier.anomalous = 0
-
-
-@kernel
-def observe_surface(c, srf, fie, m, nu, nu_max, eff):
-    """Fill `last`: where a healthy surface was, u = -h_m / Z_m, and where this one can have been, the
-    interval of the deflections p within reach, rad, with
-
-        |nu - G (p - u)| <= nu_max + r        on every axis; over a block on axis m alone
-
-    from the innovation nu = eta + G (p - u) and |eta| <= nu_max, (3,) rad/s2. m: the axis on which the
-    surface has most effect; eff: Z = G, rad/s2 per rad, h = -G u, rad/s2, tolerance r, rad/s2; fie: the
-    estimator of its position. Over a block the axes weigh a varying position differently, so that they need
-    not agree on its mean.
-    """
-    last, cmd = srf.last, srf.commands
-    last.u = -eff.h[m] / eff.Z[m]
-    last.kappa = 0.25 * (cmd.G_max - cmd.G_min) / abs(eff.Z[m])
-    axis = m if c.frames_per_block > 1 else -1
-    last.lo, last.hi = estimators.consistent_on_axes(nu, nu_max, fie, eff, axis)
-    mark_stops(srf, 2.0 * (nu_max[m] + eff.r[m]) / abs(eff.Z[m]))
-
-
-@kernel
-def mark_stops(srf, width):
-    """Fill `hides`: a stop can cut off a deflection without this being visible if it is nearer to a healthy
-    surface than the width, rad, of the interval of the true deflection.
-    """
-    srf.last.hides[0] = srf.commands.u_min[0] - srf.actuator.stop_lo < width
-    srf.last.hides[1] = srf.actuator.stop_hi - srf.commands.u_max[0] < width
-
-
-@kernel
-def observe_error(srf, e, tol):
-    """Fill `last`, but for u and kappa, of a surface with p - u = e +- tol, rad:
-
-        p in [u + e - tol, u + e + tol] within its reach,    anomalous if |e| > tol
-
-    Returns whether there is such a p.
-    """
-    last, act = srf.last, srf.actuator
-    last.lo = max(act.reach_lo, last.u + e - tol)
-    last.hi = min(act.reach_hi, last.u + e + tol)
-    last.anomalous = abs(e) > tol
-    mark_stops(srf, 2.0 * tol)
-    return last.lo <= last.hi
-
-
-@kernel
-def judged_error(srf):
-    """p - u of the surface in the judged frame, (lo, hi) rad."""
-    return srf.judged.lo - srf.judged.u, srf.judged.hi - srf.judged.u
-
-
-@kernel
-def last_error(srf):
-    """p - u in the elapsed frame, rad, with p in the middle of its interval."""
-    return 0.5 * (srf.last.lo + srf.last.hi) - srf.last.u

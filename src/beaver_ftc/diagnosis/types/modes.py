@@ -19,10 +19,10 @@ from beaver_ftc.diagnosis.types import (
     SCALE_COMMAND,
     SUBTRACT_OFFSET,
     WAIT_FOR_SURFACE,
-    last_error,
     registry,
     set_middle,
 )
+from beaver_ftc.diagnosis.types.observations import last_error
 from beaver_ftc.diagnosis.types.registry import (
     END_TYPE,
     ERROR_TYPES,

@@ -14,7 +14,7 @@ import numpy as np
 from beaver_ftc.compiled import fill, record, sized
 from beaver_ftc.diagnosis.model_prediction import DEFAULT_RATE_RAD_S, servo_data
 from beaver_ftc.diagnosis.state import PITCH_GROUP
-from beaver_ftc.diagnosis.types import OBSERVATION_RECORD
+from beaver_ftc.diagnosis.types.observations import OBSERVATION_RECORD
 from beaver_ftc.diagnosis.types.registry import N_TYPES, TYPES
 from beaver_ftc.scenario.declared import Declared
 
@@ -111,7 +111,7 @@ FRAME_BLOCK_RECORD = record(n_so_far=int, nu=3, nu_bound=3, n_start=3)
 
 @lru_cache
 def surface_types_dtype() -> np.dtype:
-    """The records of one surface: configuration, observations of three blocks (types/__init__.py), the
+    """The records of one surface: configuration, observations of three blocks (observations.py), the
     memories of the types, and what is concluded.
 
     not_at_position: whether the estimator of its position is excluded. first_sets: its feasible sets as

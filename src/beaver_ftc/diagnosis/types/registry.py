@@ -11,7 +11,7 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel, one_of
 from beaver_ftc.diagnosis.sets import EMPTY_SET, UNLIMITED_SET
-from beaver_ftc.diagnosis.types import REST_HIDES_TYPE, FaultType, Kernel, table
+from beaver_ftc.diagnosis.types import MODES, REST_HIDES_TYPE, FaultType, Kernel, table
 
 
 def _load_types() -> tuple[FaultType, ...]:
@@ -53,7 +53,7 @@ MUST_SHOW = np.array([row.has_shown is not None for row in TYPES])
 # CAN_LOOK_LIKE[h, j]: whether type h can look like type j. SERVES[mode, h]: whether a mode serves type h.
 CAN_LOOK_LIKE = np.array([[other.name in row.can_look_like for other in TYPES] for row in TYPES])
 SERVES = np.array(
-    [[mode in (row.accommodation_mode, *row.other_accommodation_modes) for row in TYPES] for mode in range(4)]
+    [[mode in (row.accommodation_mode, *row.other_accommodation_modes) for row in TYPES] for mode in MODES]
 )
 # Masks of types (N_TYPES,): all; with a constant parameter, and varying ones; of the varying ones, those that
 # must show themselves, and the quiet ones, which need not; of one mode, VARYING_OF_MODE[mode]; those that can
@@ -61,7 +61,7 @@ SERVES = np.array(
 ALL, CONSTANT = np.ones(N_TYPES, bool), np.arange(N_TYPES) < N_CONSTANT
 VARYING = ~CONSTANT
 VARYING_SHOWN, VARYING_QUIET = VARYING & MUST_SHOW, VARYING & ~MUST_SHOW
-VARYING_OF_MODE = VARYING & (np.arange(4)[:, None] == MODE)
+VARYING_OF_MODE = VARYING & (np.array(MODES)[:, None] == MODE)
 VARYING_LIKE = VARYING & CAN_LOOK_LIKE.T
 HIDDEN_AT_REST = REST == REST_HIDES_TYPE
 # NAMED[h]: mask of the types that have the name of type h, if h is the first of them; NAMED[-1], the last

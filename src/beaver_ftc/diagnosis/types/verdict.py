@@ -53,13 +53,6 @@ BY_ESTIMATOR, DEDUCED_FAULTY, DEDUCED_HEALTHY = range(3)
 
 
 @kernel
-def record_exclusions(surfs, layout, est):
-    """Record for every surface whether the estimator of its position is excluded."""
-    for s, srf in enumerate(surfs):
-        srf.not_at_position = est[layout.position[s]].excluded
-
-
-@kernel
 def can_be_faulty(srf):
     """Whether a surface can be at fault: as pairs.py has deduced, or else if the estimator of its position is
     not excluded."""
@@ -206,9 +199,7 @@ def others_dismissed(types, sole):
     c, wait_half_cycles = types.config, 1
     for s, srf in enumerate(types.surface):
         if s != sole and srf.status.may_be_sole and can_be_faulty(srf):
-            if c.has_eG and any_remains(srf, ALL):
-                return False
-            if not would_have_shown(c, srf):
+            if (c.has_eG and any_remains(srf, ALL)) or not would_have_shown(c, srf):
                 return False
             for h in range(N_TYPES):
                 if type_remains(srf, h):

@@ -14,10 +14,10 @@ from beaver_ftc.diagnosis.types import (
     FaultType,
     clip_travel,
     feasible_set,
-    judged_error,
     middle_estimate,
     set_middle,
 )
+from beaver_ftc.diagnosis.types.observations import judged_error
 
 
 @kernel

@@ -98,7 +98,7 @@ def motion_rules_out(srf, h, stop):
 
 
 def estimate_parameter(fdi: np.void, s: int, h: int) -> float:
-    """b in the elapsed frame, rad: as `types.last_error`, for Python code."""
+    """b in the elapsed frame, rad: as `observations.last_error`, for Python code."""
     last = fdi["types"]["surface"][s]["last"]
     return float(0.5 * (last["lo"] + last["hi"]) - last["u"])
 

@@ -11,7 +11,8 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel, record
 from beaver_ftc.diagnosis.sets import EMPTY_SET, UNLIMITED_SET
-from beaver_ftc.diagnosis.types import REST_EXCLUDES_TYPE, SUBTRACT_OFFSET, FaultType, judged_error
+from beaver_ftc.diagnosis.types import REST_EXCLUDES_TYPE, SUBTRACT_OFFSET, FaultType
+from beaver_ftc.diagnosis.types.observations import judged_error
 
 MIN_HALF_CYCLES = 3  # two whole ones, and the first, which is cut off at its beginning
 

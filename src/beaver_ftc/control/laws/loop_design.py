@@ -128,15 +128,14 @@ def margins(L: np.ndarray) -> tuple[float, float, float]:
     if not L.any():
         return inf, inf, inf
     level, phase = 20.0 * np.log10(np.abs(L)), np.degrees(np.unwrap(np.angle(L)))
-    upper, lower = inf, inf
+    turns = (-1260.0, -900.0, -540.0, -180.0, 180.0)  # deg, where L is real and negative
+    levels = [x for turn in turns for x in _at_zeros(phase - turn, level)]
     if L[-1].real < -abs(L[-1].imag) * 1e6:
-        upper, lower = (-level[-1], inf) if level[-1] < 0.0 else (inf, level[-1])
-    for turn in (-1260.0, -900.0, -540.0, -180.0, 180.0):  # deg, where L is real and negative
-        levels = _at_zeros(phase - turn, level)
-        upper = min([upper, *(-x for x in levels if x < 0.0)])
-        lower = min([lower, *(x for x in levels if x >= 0.0)])
-    distances = [abs((x + 180.0) % 360.0) for x in _at_zeros(level, phase)]
-    return upper, lower, min([inf, *(min(x, 360.0 - x) for x in distances)])
+        levels.append(level[-1])
+    upper = min((-x for x in levels if x < 0.0), default=inf)
+    lower = min((x for x in levels if x >= 0.0), default=inf)
+    distances = (abs((x + 180.0) % 360.0) for x in _at_zeros(level, phase))
+    return upper, lower, min((min(x, 360.0 - x) for x in distances), default=inf)
 
 
 def _at_zeros(x: np.ndarray, y: np.ndarray) -> list[float]:

@@ -23,6 +23,7 @@ from beaver_ftc.diagnosis.types import (
     SUBTRACT_OFFSET,
     WAIT_FOR_SURFACE,
     modes,
+    remaining,
     verdict,
 )
 from beaver_ftc.diagnosis.types.observations import last_error
@@ -101,7 +102,7 @@ def hold_assessment(out, types):
     out.lags = 0
     out.lag[:] = 0.0
     for s, surf in enumerate(types.surface):
-        if out.accommodation_mode[s] != GIVE_UP and not verdict.constant_remains(surf):
+        if out.accommodation_mode[s] != GIVE_UP and not remaining.constant_remains(surf):
             out.offset[s] = 0.0
 
 

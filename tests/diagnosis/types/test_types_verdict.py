@@ -14,6 +14,7 @@ from beaver_ftc.diagnosis.types import (
     examination,
     modes,
     pairs,
+    remaining,
     verdict,
 )
 from beaver_ftc.diagnosis.types.registry import N_TYPES
@@ -100,11 +101,11 @@ NOBODY_ELSE = {"aileron": None, "elevator": None, "flap": None}
 )
 def test_what_kind_of_fault_it_may_be(kinds, fixed, one_type, sole_shown):
     _, surface = one(*kinds)
-    same_name = verdict.SAME_NAME[sole_shown] if sole_shown >= 0 else -1
+    same_name = remaining.SAME_NAME[sole_shown] if sole_shown >= 0 else -1
     assert (modes.choose_mode(surface) == GIVE_UP) == fixed
-    assert max(verdict.sole_type(surface, verdict.CONSTANT), -1) == one_type
-    found = verdict.sole_shown_type(surface, verdict.ALL)
-    assert (verdict.SAME_NAME[found] if found >= 0 else -1) == same_name
+    assert max(remaining.sole_type(surface, remaining.CONSTANT), -1) == one_type
+    found = remaining.sole_shown_type(surface, remaining.ALL)
+    assert (remaining.SAME_NAME[found] if found >= 0 else -1) == same_name
 
 
 def test_the_sole_surface_that_is_possible():
@@ -124,7 +125,7 @@ def test_the_sole_surface_that_is_possible():
 )
 def test_what_looks_like_a_jam_may_be_slow_until_it_has_stood_off_for_long(evidence, n_rest, slow):
     fdi, surface = one(STUCK, SLOW, evidence=evidence, n_rest=n_rest)
-    assert bool(on(verdict.may_be_hidden, fdi, surface)) == slow
+    assert bool(on(remaining.may_be_hidden, fdi, surface)) == slow
 
 
 @pytest.mark.parametrize(
@@ -153,9 +154,9 @@ def test_a_type_is_named_once_it_is_the_only_one(kinds, evidence, half_cycles, f
     """In sets that errors declared of our own make coarse, a constant proves nothing: one type of all."""
     fdi, surface = one(*kinds, evidence=evidence, n_unhidden=evidence)
     surface["oscillatory"]["n_half"] = half_cycles
-    assert on(verdict.type_on_surface, fdi, surface) == found
+    assert on(remaining.type_on_surface, fdi, surface) == found
     fdi["types"]["config"]["has_eG"] = 1
-    assert on(verdict.type_on_surface, fdi, surface) == in_coarse_sets
+    assert on(remaining.type_on_surface, fdi, surface) == in_coarse_sets
 
 
 @pytest.mark.parametrize(

@@ -28,9 +28,9 @@ parameter; low > high is the empty set. A type is excluded once its set is empty
 surface's diagnosis restarts.
 
 registry.py reads the rows into arrays, and records.py has the records. In each frame examination.py finds
-where each surface was (observations.py) and tests every type. verdict.py, and for two faults pairs.py,
-conclude which surface and type it is, modes.py what the law does about it, and findings.py puts it in words;
-they name no type.
+where each surface was (observations.py) and tests every type. remaining.py concludes which type it is,
+verdict.py on which surface, and pairs.py the same for two faults. modes.py chooses what the law does about
+it, and findings.py puts it in words. These files name no type.
 
     s, srf          surface, and its record (`records.surface_types_dtype`)
     h               type: its number, the same in every array over types

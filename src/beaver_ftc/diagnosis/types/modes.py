@@ -7,7 +7,8 @@
     lead        the surface, and its mode, that the supervisor of the law follows (control/accommodation.py)
     silent      a fault with whose deflection error the last frame does not agree
 
-types: of `fault_types_dtype`; layout: of `state.layout_dtype`. Other symbols: verdict.py, types/__init__.py.
+types: of `fault_types_dtype`; layout: of `state.layout_dtype`. Other symbols: remaining.py, verdict.py,
+types/__init__.py.
 """
 
 import numpy as np
@@ -31,14 +32,8 @@ from beaver_ftc.diagnosis.types.registry import (
     SERVES,
     VARYING_OF_MODE,
 )
-from beaver_ftc.diagnosis.types.verdict import (
-    NO_SURFACE,
-    any_remains,
-    can_be_faulty,
-    constant_remains,
-    sole_surface,
-    type_remains,
-)
+from beaver_ftc.diagnosis.types.remaining import any_remains, constant_remains, type_remains
+from beaver_ftc.diagnosis.types.verdict import NO_SURFACE, can_be_faulty, sole_surface
 
 MAX_SILENCE_S = 0.2  # a fault that has been silent for as long is taken for gone
 _TIME_TOLERANCE_S = 1e-9

@@ -8,20 +8,15 @@ remains on each.
     types     record of `fault_types_dtype`
     layout    gives the surfaces that lead roll and yaw (main)
 
-Other symbols: verdict.py, types/__init__.py.
+Other symbols: verdict.py, remaining.py, types/__init__.py.
 """
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis.state import LATERAL_GROUP, ROLL, YAW
 from beaver_ftc.diagnosis.types.observations import observe_error
 from beaver_ftc.diagnosis.types.registry import ALL
-from beaver_ftc.diagnosis.types.verdict import (
-    any_remains,
-    can_be_faulty,
-    explains_flight,
-    type_on_surface,
-    update_status,
-)
+from beaver_ftc.diagnosis.types.remaining import any_remains, explains_flight, type_on_surface
+from beaver_ftc.diagnosis.types.verdict import can_be_faulty, update_status
 
 
 @kernel

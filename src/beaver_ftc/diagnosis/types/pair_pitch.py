@@ -13,17 +13,30 @@ In any other case the plane of pitch stays open.
     layout          gives the group of a surface and the other surface in it (partner)
     srf1, srf2      surfaces of the first and of the second fault
 
-Other symbols: verdict.py, types/__init__.py.
+Other symbols: verdict.py, remaining.py, types/__init__.py.
 """
 
 import numpy as np
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis.state import PITCH, PITCH_GROUP
-from beaver_ftc.diagnosis.types import GIVE_UP, examination, verdict
+from beaver_ftc.diagnosis.types import GIVE_UP, examination, remaining
 from beaver_ftc.diagnosis.types.observations import forget_anomalies, last_error, observe_error, set_anomalous
 from beaver_ftc.diagnosis.types.registry import ALL, CONSTANT, MODE, N_CONSTANT, N_TYPES, deflection_range
-from beaver_ftc.diagnosis.types.verdict import NO_SURFACE, can_be_faulty, constant_remains, type_remains
+from beaver_ftc.diagnosis.types.remaining import (
+    TYPE_UNDECIDED,
+    constant_remains,
+    type_on_surface,
+    type_remains,
+)
+from beaver_ftc.diagnosis.types.verdict import (
+    DEDUCED_FAULTY,
+    DEDUCED_HEALTHY,
+    NO_SURFACE,
+    can_be_faulty,
+    find_surface,
+    update_status,
+)
 
 
 @kernel
@@ -65,7 +78,7 @@ def locate_second(types, layout, est, nu, nu_max):
     e = (nu[PITCH] - M1 * last_error(srf1)) / M2
     tol = 0.5 * abs(M1) * (hi - lo) + nu_max[PITCH] + eff1.r[PITCH] + eff2.r[PITCH]
     if not observe_error(srf2, e, tol / abs(M2)):
-        srf2.status.basis = verdict.DEDUCED_HEALTHY
+        srf2.status.basis = DEDUCED_HEALTHY
 
 
 @kernel
@@ -91,17 +104,17 @@ def isolate_pitch(types, layout, t):
     sole = sole_pitch(types, layout)
     for s, srf in enumerate(types.surface):
         if layout.group[s] == PITCH_GROUP:
-            kind = verdict.type_on_surface(types.config, srf) if s == sole else verdict.TYPE_UNDECIDED
+            kind = type_on_surface(types.config, srf) if s == sole else TYPE_UNDECIDED
             # a jam may as well be a trailing surface or one at its stop, if the other is off by a constant
             open_yet = kind >= 0 and MODE[kind] == GIVE_UP
-            verdict.update_status(srf, s == sole, verdict.TYPE_UNDECIDED if open_yet else kind, t)
+            update_status(srf, s == sole, TYPE_UNDECIDED if open_yet else kind, t)
 
 
 @kernel
 def sole_pitch(types, layout):
     """The surface of pitch at fault if a constant type explains everything on it, or NO_SURFACE; its sets are
     stored once varying types are dismissed."""
-    s = verdict.find_surface(types, layout) if types.pair.group_alarm[PITCH_GROUP] else NO_SURFACE
+    s = find_surface(types, layout) if types.pair.group_alarm[PITCH_GROUP] else NO_SURFACE
     if s < 0 or not constant_remains(types.surface[s]):
         return NO_SURFACE
     if dismiss_varying(types.config, types.surface[s]):
@@ -114,10 +127,10 @@ def dismiss_varying(c, srf):
     """Whether no varying type needs to be considered any more: a slow oscillation, a slow surface or a
     growing bias would have shown by now. No growing bias (not in FOLLOWS_COMMAND) can look like the constant
     type, no type is hidden, and the flight has been anomalous for half a cycle."""
-    imitated = verdict.can_be_another(srf, verdict.sole_type(srf, CONSTANT), False)
-    in_doubt = imitated or verdict.may_be_hidden(c, srf)
+    imitated = remaining.can_be_another(srf, remaining.sole_type(srf, CONSTANT), False)
+    in_doubt = imitated or remaining.may_be_hidden(c, srf)
     long_enough = srf.evidence.n_anomalous >= c.half_frames
-    return long_enough and verdict.would_have_shown(c, srf) and not in_doubt
+    return long_enough and remaining.would_have_shown(c, srf) and not in_doubt
 
 
 @kernel
@@ -161,7 +174,7 @@ def begin_second_if_shown(types, layout):
     copy_sets(srf1.sets, srf1.first_sets)
     examination.restart_surface(srf2)
     for srf in (srf1, srf2):
-        srf.status.may_be_sole, srf.status.basis = 0, verdict.DEDUCED_FAULTY
+        srf.status.may_be_sole, srf.status.basis = 0, DEDUCED_FAULTY
         forget_anomalies(srf)
 
 
@@ -172,7 +185,7 @@ def update_second(types, layout, t):
     s1 = types.pair.first_pitch
     srf1, srf2 = types.surface[s1], types.surface[layout.partner[s1]]
     anomalous = srf2.evidence.n_anomalous > 0
-    possible = can_be_faulty(srf2) and verdict.any_remains(srf2, ALL)
-    verdict.update_status(srf1, possible or not anomalous, srf1.status.fault_type, t)
-    shows = anomalous and possible and verdict.explains_flight(srf2)
-    verdict.update_status(srf2, shows, verdict.type_on_surface(types.config, srf2), t)
+    possible = can_be_faulty(srf2) and remaining.any_remains(srf2, ALL)
+    update_status(srf1, possible or not anomalous, srf1.status.fault_type, t)
+    shows = anomalous and possible and remaining.explains_flight(srf2)
+    update_status(srf2, shows, type_on_surface(types.config, srf2), t)

@@ -7,7 +7,7 @@ Elevator and flap move pitch alone, ailerons and rudder roll and yaw alone: each
     past            record of `conclusion_dtype`, of the frame before
     bank            detection filters
 
-Other symbols: verdict.py, types/__init__.py.
+Other symbols: verdict.py, remaining.py, types/__init__.py.
 """
 
 import numpy as np

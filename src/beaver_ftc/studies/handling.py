@@ -25,7 +25,7 @@ from beaver_ftc.plant.linear import LinearModel, differences
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.linear_systems import CLASSICAL, Mode, modes
 from beaver_ftc.studies.margins import over_envelope
-from beaver_ftc.studies.present.tables import aligned, grouped, number
+from beaver_ftc.studies.present.tables import aligned, grouped, number, values_of
 
 WORSE = 4  # in place of a level: worse than level 3
 _STATES = ("alpha_rad", "beta_rad", "p_rad_s", "q_rad_s", "r_rad_s", "phi_rad", "theta_rad", "psi_rad")
@@ -169,7 +169,7 @@ def as_text(rows: list[Document]) -> str:
             f"{number(row['value'], none='never')} ({level_text(row['level'])})" for row in rows_of_condition
         ]
         lines.append(
-            [f"{airspeed_mps:.1f}{ended}", *cells, level_text(max(row["level"] for row in rows_of_condition))]
+            [f"{airspeed_mps:.1f}{ended}", *cells, level_text(max(values_of(rows_of_condition, "level")))]
         )
     clauses = ", ".join(dict.fromkeys(f"{limit.clause} {limit.table}".strip() for limit in LIMITS))
     legend = f"in brackets: level of MIL-F-8785C, class I, category B:\n{clauses}"

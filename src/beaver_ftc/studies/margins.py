@@ -202,5 +202,5 @@ def as_text(document: Document) -> str:
         worst = rows[int(np.argmin(numbers["phase_deg"]))]
         table.append([*place, *(f"{min(n):.1f}" for n in numbers.values()), f"{worst['airspeed_mps']:.0f}"])
     short = sum(not row["keeps"] for row in document["margins"])
-    required = f"{document['gain_margin_db']:g} dB or {document['phase_margin_deg']:g} deg"
+    required = "{gain_margin_db:g} dB or {phase_margin_deg:g} deg".format(**document)
     return f"{aligned(table)}\n\n{len(document['margins'])} loops, {short} with less than {required}"

@@ -10,6 +10,8 @@ from beaver_ftc.results.style import SERIES
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+else:  # matplotlib is imported when a figure is drawn
+    Axes = Figure = Any
 
 DPI = 110
 DASHES: tuple[Any, ...] = ("-", (0, (5, 2)), (0, (2, 2)), (0, (6, 2, 1, 2)), (0, (1, 1)))
@@ -19,7 +21,7 @@ GRID = "#dddddd"  # colour of grid lines and of hatched cells
 
 def panels(
     down: int, across: int, width: float, height: float, title: str = "", dpi: int = DPI, **subplots: Any
-) -> tuple["Figure", Any]:
+) -> tuple[Figure, Any]:
     """A figure of this width and height, inches, without the global state of matplotlib, and its panels
     (down, across)."""
     from matplotlib.figure import Figure
@@ -52,7 +54,7 @@ def marker(place: int) -> str:
 
 
 def heat_map(
-    axes: "Axes",
+    axes: Axes,
     values: np.ndarray,
     labels: dict[tuple[int, int], tuple[str, str]],
     columns: Sequence[str],
@@ -75,7 +77,7 @@ def heat_map(
 
 
 def draw_estimates(
-    axes: "Axes", places: Sequence[float], estimates: Sequence[Mapping[str, Any]], times: float = 1.0,
+    axes: Axes, places: Sequence[float], estimates: Sequence[Mapping[str, Any]], times: float = 1.0,
     across: bool = False, **look: Any,
 ) -> None:  # fmt: skip
     """Draw values with bars for their intervals. places: on the other axis. estimates: `value`, `low` and

@@ -68,6 +68,7 @@ Part = str | Heading | Table | Bullets | Links | Pictures
 
 
 Parts = Sequence[Part]  # the parts of a page from top to bottom; HTML leaves out an empty text
+Page = tuple[str, Parts]  # title and parts
 
 
 def table(columns: Columns, rows: Iterable[Any]) -> Table:
@@ -158,7 +159,7 @@ def drawn_in(folder: Path, stems: Iterable[str]) -> dict[str, Path]:
 
 
 def study_files(
-    name: str, page: Callable[[Any], tuple[str, Parts]], rows: Mapping[str, Callable[[Any], Any]],
+    name: str, page: Callable[[Any], Page], rows: Mapping[str, Callable[[Any], Any]],
     figures: "Makers",
 ) -> "Makers":  # fmt: skip
     """The files of a study: document, CSV, figures and page.

@@ -77,6 +77,21 @@ def grouped(rows: Iterable[Document], *names: str) -> Groups:
     return groups
 
 
+def values_of(rows: Iterable[Mapping[str, Any]], key: str) -> list[Any]:
+    """The value of each row under a key."""
+    return [row[key] for row in rows]
+
+
+def known_values(rows: Iterable[Mapping[str, Any]], key: str) -> list[Any]:
+    """The values under a key that are not None."""
+    return [value for value in values_of(rows, key) if value is not None]
+
+
+def sum_of(rows: Iterable[Mapping[str, Any]], key: str) -> Any:
+    """The sum of the values under a key; if they are flags, the number of rows that have it."""
+    return sum(values_of(rows, key))
+
+
 class Column(NamedTuple):
     """A column of a table: its head, and its cell of a row.
 

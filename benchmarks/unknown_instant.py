@@ -33,17 +33,9 @@ import numpy as np
 from beaver_ftc.diagnosis.rivals.gust import VaneGust
 from beaver_ftc.scenario.airframe import find_aircraft
 from beaver_ftc.studies.compare.replay import Recording, Trace, record, trace
-from beaver_ftc.studies.detectability.probabilities import level_for
-from beaver_ftc.studies.detectability.schemes import (
-    BOTH,
-    WATCHED_S,
-    Block,
-    Condition,
-    loss,
-    scenario_of,
-    strikes_at_s,
-    with_fdi,
-)
+from beaver_ftc.studies.detectability.grid import WATCHED_S, Block, Condition
+from beaver_ftc.studies.detectability.levels import level_for
+from beaver_ftc.studies.detectability.schemes import BOTH, loss, scenario_of, strikes_at_s, with_fdi
 
 MAGNITUDES, EXCITATIONS_DEG_S = (0.4, 1.0), (3.0, 6.0)
 PER_H, EVERY, FURTHEST = 20.0, 5, 1000  # false alarms; frames between instants, and back

@@ -148,7 +148,8 @@ def _compare_runs(folders: list[Path], out: Path, format: Format) -> None:
 def _compare_on_flights(options: Options, most: int | None) -> None:
     """Compare schemes and laws on the flights of a sweep, or of the standard sets, and print the result."""
     from beaver_ftc.studies.compare.leaderboard import as_text, comparison_study, write_leaderboard
-    from beaver_ftc.studies.compare.trial import LAW, SCHEME, entries_of, of_set, of_sweep, set_names
+    from beaver_ftc.studies.compare.sets import of_set, of_sweep, set_names
+    from beaver_ftc.studies.compare.trial import LAW, SCHEME, entries_of
     from beaver_ftc.studies.compare.tune import read_tuned
     from beaver_ftc.studies.engine.processes import cores
     from beaver_ftc.studies.engine.study import run_into
@@ -206,7 +207,8 @@ def _tune(options: Options, most: int | None) -> None:
     """Search parameters of schemes and laws, write them, and print them."""
     from beaver_ftc.plugins import DETECTORS, LAWS, registered
     from beaver_ftc.studies.compare.trial import STATISTICAL
-    from beaver_ftc.studies.compare.tune import Search, as_text, methods_of, tune, write_tuned
+    from beaver_ftc.studies.compare.tune import Search, methods_of, tune, write_tuned
+    from beaver_ftc.studies.compare.tune_shown import as_text
     from beaver_ftc.studies.engine.processes import cores
 
     everything = options.schemes is None and options.laws is None

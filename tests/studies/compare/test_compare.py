@@ -12,20 +12,16 @@ from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.sweeps import load_sweep
 from beaver_ftc.studies.compare.leaderboard import MARK, as_text, write_leaderboard
 from beaver_ftc.studies.compare.scores import document_of
+from beaver_ftc.studies.compare.sets import CALIBRATION, benchmark_folder, of_set, of_sweep, set_names
 from beaver_ftc.studies.compare.trial import (
-    CALIBRATION,
     LAW,
     ORACLE,
     SCHEME,
     STATISTICAL,
     Entry,
-    benchmark_folder,
     entries_of,
     fly_case,
     grade_of,
-    of_set,
-    of_sweep,
-    set_names,
     with_entry,
 )
 from commands import beaver

@@ -13,7 +13,8 @@ from beaver_ftc.studies.compare.criteria import (
     DetectorCost,
     LawCost,
 )
-from beaver_ftc.studies.compare.trial import LAW, Entry, Result, SetFlight
+from beaver_ftc.studies.compare.sets import SetFlight
+from beaver_ftc.studies.compare.trial import LAW, Entry, Result
 from beaver_ftc.studies.margins import Margin
 from flying import loss, scenario
 
@@ -48,8 +49,7 @@ MARGINS = [Margin(40.0, "none", "rudder", 9.0, inf, 60.0), Margin(50.0, "none", 
 @pytest.fixture
 def law(monkeypatch):
     """A law on four faulted flights; the oracle's errors and the default law's effort are made up."""
-    monkeypatch.setattr(criteria, "flights", lambda *_: CASES)
-    monkeypatch.setattr(criteria, "yardsticks", lambda *_: ((1.0, 2.0, 4.0, 1.0), 2.0))
+    monkeypatch.setattr(criteria, "yardsticks", lambda *_: ([FAULTED] * 4, (1.0, 2.0, 4.0, 1.0), 2.0))
     monkeypatch.setattr(criteria, "margins_of", lambda scenario: MARGINS)
     return LawCost("lqr", "exact", None, 0)
 

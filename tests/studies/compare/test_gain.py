@@ -9,7 +9,7 @@ import pytest
 from beaver_ftc.studies.compare import gain
 from beaver_ftc.studies.compare.criteria import flights
 from beaver_ftc.studies.compare.gain import JUDGED, relative_gain
-from beaver_ftc.studies.compare.trial import CALIBRATION, of_set, set_names
+from beaver_ftc.studies.compare.sets import CALIBRATION, of_set, set_names
 
 
 @pytest.mark.parametrize(

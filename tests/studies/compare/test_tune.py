@@ -20,14 +20,8 @@ from beaver_ftc.plugins import DETECTORS, LAWS, Range, registered, tunable
 from beaver_ftc.studies.compare.criteria import INADMISSIBLE
 from beaver_ftc.studies.compare.search import EDGE, on_scale
 from beaver_ftc.studies.compare.trial import LAW, SCHEME, STATISTICAL
-from beaver_ftc.studies.compare.tune import (
-    LEAST_GAIN,
-    Search,
-    as_text,
-    methods_of,
-    read_tuned,
-    tune,
-)
+from beaver_ftc.studies.compare.tune import LEAST_GAIN, Search, methods_of, read_tuned, tune
+from beaver_ftc.studies.compare.tune_shown import as_text
 from commands import beaver
 from flying import scenario
 

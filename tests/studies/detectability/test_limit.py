@@ -15,14 +15,8 @@ from beaver_ftc.diagnosis.informed_test import (
 from beaver_ftc.diagnosis.rivals.gust import VaneGust
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.studies.compare.replay import Recorder, record
-from beaver_ftc.studies.detectability.schemes import (
-    Block,
-    Condition,
-    deflections,
-    loss,
-    scenario_of,
-    strikes_at_s,
-)
+from beaver_ftc.studies.detectability.grid import Block, Condition
+from beaver_ftc.studies.detectability.schemes import deflections, loss, scenario_of, strikes_at_s
 
 DT = 0.01
 LIGHT = Condition("tactical-grade", "light")

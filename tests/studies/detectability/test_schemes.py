@@ -13,21 +13,12 @@ from beaver_ftc.diagnosis.informed_test import detection_probability
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.studies.compare.replay import Trace, alarms_at, record
 from beaver_ftc.studies.detectability.command import schemes_study
-from beaver_ftc.studies.detectability.probabilities import (
-    JUDGED_S,
-    document_of,
-    informed_shares,
-    level_for,
-    rows_of,
-    summary,
-    title_of,
-)
+from beaver_ftc.studies.detectability.grid import GRIDS, Block, Condition, title_of
+from beaver_ftc.studies.detectability.levels import level_for, rows_of
+from beaver_ftc.studies.detectability.probabilities import JUDGED_S, document_of, informed_shares, summary
 from beaver_ftc.studies.detectability.schemes import (
     BUILT_IN,
     ESTIMATORS,
-    GRIDS,
-    Block,
-    Condition,
     Watched,
     contenders,
     fly_block,
@@ -121,7 +112,7 @@ class TestLevels:
         traces = healthy(*largest)
         level = level_for(traces, per_h)
         alarms, hours = alarms_at(traces, level)
-        assert alarms <= max(per_h * hours, 0.0) + 1e-6
+        assert alarms <= per_h * hours + 1e-6
         assert alarms == sum(value > level for value in largest)
         below = [value for value in largest if value < level]
         if below:

@@ -10,7 +10,8 @@ import beaver_ftc as bf
 from beaver_ftc.cli.main import app
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.studies.detectability import sizes as survey
-from beaver_ftc.studies.detectability.sizes import Flight, Request, check, fly_one, variants_of
+from beaver_ftc.studies.detectability.sizes import Flight, Request, check, fly_one
+from beaver_ftc.studies.detectability.variants import variants_of
 
 STAGES = (36,)  # the fewest of which an order statistic bounds the 0.9 quantile from above
 SCENARIO = {

@@ -14,8 +14,8 @@ from beaver_ftc.diagnosis.isolation import estimator_names
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.plant.channels import log_columns
 from beaver_ftc.results.log import unit_of
-from beaver_ftc.studies.detectability import places, probabilities
-from beaver_ftc.studies.detectability.schemes import WITHIN_S
+from beaver_ftc.studies.detectability import levels, places
+from beaver_ftc.studies.detectability.grid import WITHIN_S
 from beaver_ftc.studies.mismatch import split, study
 from beaver_ftc.studies.mismatch.sources import SOURCES
 from beaver_ftc.studies.present.tables import markdown_table
@@ -57,7 +57,7 @@ def tables() -> dict[str, Columns]:
     no_rows, no_surfaces = np.empty(0), np.empty((0, 1))
     rows = LogRows(no_rows, no_rows, no_rows, no_surfaces, no_surfaces, no_surfaces, no_rows, no_rows)
     names = {
-        "detectability-grid": probabilities.COLUMNS,
+        "detectability-grid": levels.COLUMNS,
         "detectability": (*places.POINT_COLUMNS, *places.PAIR_COLUMNS),
         "mismatch": (*study.PLACE, *study.FIGURES),
         "mismatch-frames": split.COLUMNS,

@@ -8,16 +8,8 @@ from typing import Any
 
 from beaver_ftc.plugins import DETECTORS, LAWS, registered
 from beaver_ftc.studies.compare.scores import document_of
-from beaver_ftc.studies.compare.trial import (
-    LAW,
-    SCHEME,
-    STATISTICAL,
-    Entry,
-    SetFlight,
-    entries_of,
-    fly_case,
-    of_set,
-)
+from beaver_ftc.studies.compare.sets import SetFlight, of_set
+from beaver_ftc.studies.compare.trial import LAW, SCHEME, STATISTICAL, Entry, entries_of, fly_case
 from beaver_ftc.studies.compare.tune import LEAST_GAIN
 from beaver_ftc.studies.engine.statistics import CONFIDENCE, poisson_bound, wilson
 from beaver_ftc.studies.engine.study import fly_all

@@ -17,7 +17,8 @@ from beaver_ftc.documents.document import parse
 from beaver_ftc.plugins import LAWS
 from beaver_ftc.studies.compare.criteria import LawCost, effort, flights, fly_entry, least_margins
 from beaver_ftc.studies.compare.gain import geometric_mean, relative_gain
-from beaver_ftc.studies.compare.trial import CALIBRATION, DRAW, LAW, SCHEME, Entry
+from beaver_ftc.studies.compare.sets import CALIBRATION, DRAW
+from beaver_ftc.studies.compare.trial import LAW, SCHEME, Entry
 from beaver_ftc.studies.present.tables import markdown_table
 from tools.docs.tables import aside, table_of
 

@@ -13,8 +13,9 @@ from beaver_ftc.loop.loop import fly
 from beaver_ftc.scenario.schema import load_scenario
 from beaver_ftc.scenario.sweeps import load_sweep
 from beaver_ftc.studies.detectability.command import schemes_study
+from beaver_ftc.studies.detectability.grid import GRIDS
 from beaver_ftc.studies.detectability.probabilities import DUELS_S
-from beaver_ftc.studies.detectability.schemes import GRIDS, contenders
+from beaver_ftc.studies.detectability.schemes import contenders
 from beaver_ftc.studies.detectability.schemes_shown import who_is_better
 from beaver_ftc.studies.engine.statistics import share_within, wilson
 from beaver_ftc.studies.engine.study import fly_all, run_into, run_study

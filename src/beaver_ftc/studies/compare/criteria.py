@@ -42,15 +42,13 @@ from beaver_ftc.loop.loop import Loop, fly
 from beaver_ftc.plugins import DETECTORS, LAWS
 from beaver_ftc.results.judgement import Truth
 from beaver_ftc.studies.compare.margins_in_flight import margins_of
+from beaver_ftc.studies.compare.sets import CALIBRATION, SetFlight, of_set
 from beaver_ftc.studies.compare.trial import (
-    CALIBRATION,
     LAW,
     ORACLE,
     SCHEME,
     Entry,
     Result,
-    SetFlight,
-    of_set,
     result_of,
     with_entry,
     with_values,
@@ -177,9 +175,9 @@ class LawCost(Cost):
     """J of a law, exp(mean of all parts), or the cost of a candidate that is not admissible."""
 
     def __init__(self, name: str, grade: str, most: int | None, draw: int, draws: int = 1) -> None:
-        cases = [case for case in flights(grade, most, draw, draws) if case.scenario.faults]
+        cases, self._oracle, self._default_effort = yardsticks(grade, most, draw, draws)
         super().__init__(LAWS, Entry(SCHEME, name), cases)
-        self._oracle, self._effort_allowed = yardsticks(grade, most, draw, draws)
+        self._like = cases[0].scenario  # with the aircraft and the requirements of all flights of the grade
 
     def __call__(self, values: Values) -> float:
         """J with these values, or its extrapolation, or the cost in its place."""
@@ -191,12 +189,12 @@ class LawCost(Cost):
 
     def margins(self, values: Values) -> list[Margin]:
         """The margins of the healthy loop."""
-        return margins_of(with_values(with_entry(self._cases[0].scenario, self._entry), LAWS, values))
+        return margins_of(with_values(with_entry(self._like, self._entry), LAWS, values))
 
     def shortfall(self, values: Values) -> float:
         """The share by which the worst margin is too small, 1 - margin / required; 0 if all are kept. A NaN
         counts as a margin of 0."""
-        required = self._cases[0].scenario.control
+        required = self._like.control
         gain_db, phase_deg = least_margins(self.margins(values))
         shares = gain_db / required.gain_margin_db, phase_deg / required.phase_margin_deg
         return max(0.0, *(1.0 if isnan(share) else 1.0 - share for share in shares))
@@ -210,7 +208,7 @@ class LawCost(Cost):
             logs.append(part)
             if len(logs) >= LEAST_FLIGHTS and exp(fmean(logs)) > HOPELESS * self._lowest:
                 break
-        excess = effort(results) / (EFFORT * self._effort_allowed)
+        excess = effort(results) / (EFFORT * self._default_effort)
         if not isfinite(excess):
             return FAILED
         if excess > 1.0 and len(results) == len(self._cases):
@@ -228,11 +226,16 @@ class LawCost(Cost):
 
 
 @cache
-def yardsticks(grade: str, most: int | None, draw: int, draws: int) -> tuple[tuple[float, ...], float]:
-    """e_oracle in each faulted flight, deg/s; and the RMS surface rate of the default law, deg/s."""
+def yardsticks(
+    grade: str, most: int | None, draw: int, draws: int
+) -> tuple[list[SetFlight], list[float], float]:
+    """The faulted flights of a grade; e_oracle in each, deg/s; and the RMS surface rate of the default law
+    over all of them, deg/s."""
     cases = [case for case in flights(grade, most, draw, draws) if case.scenario.faults]
-    oracle = tuple(fly_entry(case, Entry(SCHEME, ORACLE), LAWS, {}).rms_deg_s for case in cases)
-    return oracle, effort([fly_entry(case, Entry(SCHEME, LAW), LAWS, {}) for case in cases])
+    oracle, ours = (
+        [fly_entry(case, Entry(SCHEME, law), LAWS, {}) for case in cases] for law in (ORACLE, LAW)
+    )
+    return cases, [result.rms_deg_s for result in oracle], effort(ours)
 
 
 def effort(results: Sequence[Result]) -> float:

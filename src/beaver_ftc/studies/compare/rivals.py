@@ -2,10 +2,11 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from math import inf
+from typing import NamedTuple
 
 from beaver_ftc.results.model import Document
 from beaver_ftc.studies.compare.trial import LAW, ORACLE, SCHEME, STATISTICAL
-from beaver_ftc.studies.present.tables import percent
+from beaver_ftc.studies.present.tables import percent, values_of
 
 # The keys of a line in which `better_than_ours` compares rivals with ours, and their names. The keys of
 # MATCHED are those of a point of the trade-off, too.
@@ -29,7 +30,7 @@ ERROR_AND_EFFORT = {
     "travel_median": "median travel of the surfaces, deg/s",
     "energy_median": "median energy of the surfaces, deg2/s2",
 }
-MORE_IS_BETTER = ("detection_rate", "isolation_rate", "rate")  # less of any other number
+MORE_IS_BETTER = ("detection_rate", "isolation_rate")  # less of any other number
 SIGNIFICANT = 0.05  # with a smaller p, a difference counts as more than chance
 # Schemes and laws that are no rivals: yardsticks, and variants and parts of ours.
 NO_RIVALS = ("none", STATISTICAL, ORACLE, "oracle-published", "fault-tolerant-published")
@@ -46,37 +47,56 @@ def competitors(lines: Sequence[Document]) -> tuple[dict[str, Document], dict[st
 def who_is_better(lines: Sequence[Document]) -> Document:
     """A sentence about the schemes, and one about the laws: the best of them, with intervals and
     significance. Empty if no flight has a fault."""
-    if not any(row["faults"] for row in lines):
+    if not any(values_of(lines, "faults")):
         return {}
     schemes, laws = competitors(lines)
+    error = "Tracking error over the oracle's, median"
     return {
-        "schemes": leader(schemes, SCHEME, "detection_rate", "Faults detected", percent),
-        "laws": leader(
-            laws, LAW, "ratio_median", "Tracking error over the oracle's, median", "{:.2f}".format
-        ),
+        "schemes": leader(_standings(schemes, "detection_rate"), SCHEME, "Faults detected", percent, True),
+        "laws": leader(_standings(laws, "ratio_median"), LAW, error, "{:.2f}".format),
+    }
+
+
+class Standing(NamedTuple):
+    """A number of a contender, and its duel with ours.
+
+    - estimate: the number, its lower and its upper limit; None for a missing one.
+    - duel: in how many flights the contender is `better` and `worse` than ours, and `p`, the probability of a
+      result at least as uneven between equals.
+    """
+
+    estimate: Sequence[float | None]
+    duel: Document
+
+
+def _standings(rows: Mapping[str, Document], key: str) -> dict[str, Standing]:
+    """The standing of each line by the number under this key, whose limits are `<key>_low` and
+    `<key>_high`."""
+    return {
+        name: Standing([row.get(key + end) for end in ("", "_low", "_high")], row["against_ours"])
+        for name, row in rows.items()
     }
 
 
 def leader(
-    rows: Mapping[str, Document], ours: str, key: str, title: str, cell: Callable[[float], str]
-) -> str:
+    standings: Mapping[str, Standing], ours: str, title: str, cell: Callable[[float], str],
+    more_is_better: bool = False,
+) -> str:  # fmt: skip
     """One sentence that compares the best rival with ours, each number with its interval. If their numbers
     are equal, it names all rivals that equal ours.
 
-    rows: our line and those of the rivals, by name, each with the duel `against_ours`. ours: our name. key:
-    of the number, which is better if smaller, unless it is in MORE_IS_BETTER; the keys `<key>_low` and
-    `<key>_high` are its interval. title: its name. cell: its format.
+    standings: of ours and the rivals, by name. ours: our name. title: of the number. cell: its format.
     """
-    badness = {name: _badness(row, key) for name, row in rows.items()}
-    texts = {name: f"{name} {_with_interval(row, key, cell)}" for name, row in rows.items()}
-    rivals = [name for name in rows if name != ours]
+    badness = {name: _badness(each.estimate[0], more_is_better) for name, each in standings.items()}
+    texts = {name: f"{name} {_with_interval(each.estimate, cell)}" for name, each in standings.items()}
+    rivals = [name for name in standings if name != ours]
     if not rivals:
         return f"{title}: {texts[ours]}."
     best = min(rivals, key=badness.__getitem__)
     if badness[best] == badness[ours]:
         equals = [name for name in rivals if badness[name] == badness[ours]]
         return f"{title}: {ours} and {', '.join(equals)} are equally good: {texts[ours]}."
-    duel = rows[best]["against_ours"]
+    duel = standings[best].duel
     wins = {best: duel["better"], ours: duel["worse"]}
     first, second = sorted(wins, key=badness.__getitem__)
     doubt = "" if duel["p"] < SIGNIFICANT else ", so this may be chance"
@@ -86,21 +106,19 @@ def leader(
     )
 
 
-def _badness(row: Document, key: str) -> float:
-    """A number of a line, negative if more of it is better. The line without the number is the worst."""
-    value = row.get(key)
+def _badness(value: float | None, more_is_better: bool) -> float:
+    """A number that is smaller for a better value; no value is the worst."""
     if value is None:
         return inf
-    return -value if key in MORE_IS_BETTER else value
+    return -value if more_is_better else value
 
 
-def _with_interval(row: Document, key: str, cell: Callable[[float], str]) -> str:
-    """A number of a line and its interval."""
-    value, low, high = (
-        missing if row.get(key + end) is None else cell(row[key + end])
-        for end, missing in (("", "none"), ("_low", "no limit"), ("_high", "no limit"))
+def _with_interval(estimate: Sequence[float | None], cell: Callable[[float], str]) -> str:
+    """A number and its interval."""
+    missing = ("none", "no limit", "no limit")
+    return "{} ({} to {})".format(
+        *(none if x is None else cell(x) for x, none in zip(estimate, missing, strict=True))
     )
-    return f"{value} ({low} to {high})"
 
 
 def better_than_ours(lines: Sequence[Document], free: Document) -> list[str]:
@@ -128,6 +146,7 @@ def _better(row: Document, ours: Document, compared: Mapping[str, str], name: st
     """The sentences of one rival. A number of ours that does not exist, an infinite delay or an unknown rate,
     is printed as `never`. Our own row is never better than itself."""
     for key, name_of_number in compared.items():
-        if _badness(row, key) < _badness(ours, key) - 1e-9:
+        mine, theirs = (_badness(line.get(key), key in MORE_IS_BETTER) for line in (ours, row))
+        if theirs < mine - 1e-9:
             our_text = "never" if ours.get(key) is None else f"{ours[key]:.3g}"
             yield f"{name} has the better {name_of_number}: {row[key]:.3g} against {our_text}"

@@ -4,20 +4,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.documents.validation import one_line
 from beaver_ftc.results.model import Document, Metrics, read_metrics
 from beaver_ftc.results.style import BLACK
-from beaver_ftc.studies.present.figures import panels
+from beaver_ftc.studies.present.figures import Figure, panels
 from beaver_ftc.studies.present.page import write_files
-from beaver_ftc.studies.present.tables import aligned, number
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
+from beaver_ftc.studies.present.tables import aligned, number, values_of
 
 NOTHING = "-"
 STAR = "* differs between the runs"
@@ -128,7 +124,7 @@ def as_text(runs: Sequence[Run]) -> str:
     columns = [rows_of(run) for run in runs]
     table = [["", *labels(runs)]]
     for name in columns[0]:
-        values = [column[name] for column in columns]
+        values = values_of(columns, name)
         table.append([name + (" *" if len(set(values)) > 1 else ""), *values])
     return f"{aligned(table)}\n\n{STAR}"
 
@@ -140,7 +136,7 @@ def labels(runs: Sequence[Run]) -> list[str]:
     return [one_line(name, 200) for name in (names if distinct else [str(run.folder) for run in runs])]
 
 
-def figure_of(runs: Sequence[Run]) -> "Figure":
+def figure_of(runs: Sequence[Run]) -> Figure:
     """Tracking errors of all runs over time, a panel for each axis. A dotted line: the first fault of a run
     begins."""
     figure, grid = panels(3, 1, 11.0, 9.0, dpi=120, sharex=True)

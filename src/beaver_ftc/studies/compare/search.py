@@ -92,18 +92,12 @@ def search(cost: Cost, ranges: Ranges, start: Values, trials: int, seed: int, re
     WIDENINGS widenings."""
     ranges = dict(ranges)
     widened = list[str]()
-    values = dict(start)
-    cost_now = None
-    start_cost = 0.0
-    # tried: trials. widenings: searches that ended on an edge. restarted: restarts. quiet: searches in a row
-    # that gained nothing.
-    tried = widenings = restarted = quiet = 0
+    # widenings: searches that ended on an edge. restarted: restarts. quiet: searches in a row without a gain.
+    widenings = restarted = quiet = 0
+    before = None  # cost before the last search
+    values, now, costs = _searched(cost, ranges, start, before, trials, seed)
+    start_cost, tried = costs[0], len(costs)
     while True:
-        cost_before = cost_now
-        values, cost_now, costs = _searched(cost, ranges, values, cost_before, trials, seed)
-        seed += 1
-        start_cost = costs[0] if cost_before is None else start_cost
-        tried += len(costs) - (cost_before is not None)  # a restart does not try its start again
         if edges := on_edge(values, ranges):
             if widenings == WIDENINGS:
                 raise SimulationFailed(
@@ -112,15 +106,19 @@ def search(cost: Cost, ranges: Ranges, start: Values, trials: int, seed: int, re
             widenings += 1
             widened += edges
             ranges |= {name: widen(ranges[name], upper) for name, upper in edges.items()}
-            continue
-        gains = cost_before is None or cost_now < cost_before - LITTLE * abs(cost_before)
-        quiet = 0 if gains else quiet + 1
-        if quiet == SETTLED or restarted == restarts:
-            return Found(
-                start_cost, cost_now, values, ranges, tuple(widened), trials=tried, restarts=restarted,
-                settled=quiet == SETTLED,
-            )  # fmt: skip
-        restarted += 1
+        else:
+            gains = before is None or now < before - LITTLE * abs(before)
+            quiet = 0 if gains else quiet + 1
+            if quiet == SETTLED or restarted == restarts:
+                return Found(
+                    start_cost, now, values, ranges, tuple(widened), trials=tried, restarts=restarted,
+                    settled=quiet == SETTLED,
+                )  # fmt: skip
+            restarted += 1
+        before = now
+        seed += 1
+        values, now, costs = _searched(cost, ranges, values, before, trials, seed)
+        tried += len(costs) - 1  # a restart does not try its start again
 
 
 def widen(range_: Range, upper: bool) -> Range:

@@ -1,20 +1,12 @@
 """Fly one case with every scheme and law that is compared, and return the result of each."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from math import hypot, inf
-from pathlib import Path
 from time import thread_time
 
-from beaver_ftc.diagnosis.rivals import (
-    FLIGHT_GRADES,
-    TunedValuesByGrade,
-    flight_grade,
-    load_tuned_values,
-    tuned_values,
-)
-from beaver_ftc.documents.errors import BadInput, BeaverFtcError
-from beaver_ftc.documents.files import data_root
+from beaver_ftc.diagnosis.rivals import TunedValuesByGrade, flight_grade, load_tuned_values, tuned_values
+from beaver_ftc.documents.errors import BeaverFtcError
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.loop.outcome import Landing
 from beaver_ftc.plugins import DETECTORS, LAWS, is_compiled
@@ -25,64 +17,11 @@ from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.diagnosis import Statistical
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.compare.replay import Trace, record, replay, trace
+from beaver_ftc.studies.compare.sets import SetFlight
 from beaver_ftc.studies.engine.statistics import or_never
 
 SCHEME, LAW, ORACLE = "adaptive-estimators", "fault-tolerant", "oracle"
 STATISTICAL = f"{SCHEME} with fdi.statistical"  # our scheme with its statistical detector beside it
-CALIBRATION = "calibration-"  # begin of the names of the sets for tuning; the grade follows
-DRAW = 1000  # added to the seed for each draw of a set; the seeds of all sets are smaller
-
-
-@dataclass(frozen=True)
-class SetFlight:
-    """One flight of a set."""
-
-    set: str
-    scenario: Scenario
-
-
-def of_sweep(
-    path: str | Path, set_name: str | None = None, most: int | None = None, draw: int = 0
-) -> list[SetFlight]:
-    """The first `most` flights of a sweep file; None is all. Raises BadInput for a wrong file, or one whose
-    base has `changes`.
-
-    draw: 0 flies with the seed of the file; each other number flies with another seed, and so other flights.
-    """
-    from beaver_ftc.scenario.sweeps import load_sweep
-    from beaver_ftc.studies.sweep.one_flight import scenario_of
-    from beaver_ftc.studies.sweep.sampling import Plan
-
-    sweep = load_sweep(path)
-    if draw:
-        sweep = replace(sweep, file=sweep.file.model_copy(update={"seed": sweep.file.seed + DRAW * draw}))
-    count = sweep.flights if most is None else min(most, sweep.flights)
-    assignments = Plan(sweep).assignments(range(count))
-    flights = [SetFlight(set_name or sweep.name, scenario_of(sweep, flight)) for flight in assignments]
-    if any(case.scenario.changes for case in flights):
-        raise BadInput(f"{path}: changes: each scheme and each law flies to the end, allowed: a base without")
-    return flights
-
-
-def benchmark_folder() -> Path:
-    """The folder of the standard sets. Each set is a folder of sweep files."""
-    return data_root() / "scenarios" / "benchmark"
-
-
-def set_names() -> list[str]:
-    """The names of the standard sets, without those for tuning."""
-    folders = sorted(path.name for path in benchmark_folder().iterdir() if path.is_dir())
-    return [name for name in folders if not name.startswith(CALIBRATION)]
-
-
-def of_set(name: str, most: int | None = None, draw: int = 0) -> list[SetFlight]:
-    """The flights of a standard set: the first `most` of each of its sweeps. draw: as in `of_sweep`. Raises
-    BadInput for an unknown set."""
-    folder = benchmark_folder() / name
-    if not folder.is_dir():
-        allowed = ", ".join([*set_names(), *(CALIBRATION + grade for grade in FLIGHT_GRADES)])
-        raise BadInput(f"no benchmark set {name!r}, allowed: {allowed}")
-    return [case for path in sorted(folder.glob("*.yaml")) for case in of_sweep(path, name, most, draw)]
 
 
 @dataclass(frozen=True)
@@ -198,25 +137,30 @@ def fly_case(
     """
     chosen = load_tuned_values() if chosen is None else chosen
     trial = Trial(case.set, [_fly(case.scenario, entry, chosen) for entry in entries])
-    if not trade_off:
-        return trial
+    if trade_off:
+        schemes = dict.fromkeys(entry.scheme for entry in entries if entry.scheme != "none")
+        _add_traces(trial, case.scenario, schemes, chosen)
+    return trial
+
+
+def _add_traces(trial: Trial, scenario: Scenario, schemes: Iterable[str], chosen: TunedValuesByGrade) -> None:
+    """Record the scenario under the nominal law, and add the trace of each scheme over this flight."""
     try:
-        recording = record(case.scenario)
+        recording = record(scenario)
     except BeaverFtcError as error:
         trial.failures.append(str(error))
-        return trial
-    for scheme in dict.fromkeys(entry.scheme for entry in entries if entry.scheme != "none"):
+        return
+    for scheme in schemes:
         try:
-            fdi = with_entry(case.scenario, Entry(scheme, LAW), chosen).fdi
+            fdi = with_entry(scenario, Entry(scheme, LAW), chosen).fdi
             if scheme != SCHEME and (scheme == STATISTICAL or is_compiled(DETECTORS, scheme)):
                 # only a flight with this compiled scheme has its statistic: the case is flown again
-                with_scheme = record(case.scenario.model_copy(update={"fdi": fdi}))
+                with_scheme = record(scenario.model_copy(update={"fdi": fdi}))
                 trial.traces[scheme] = trace(with_scheme, with_scheme.built_in)
             else:
                 trial.traces[scheme] = replay(recording, scheme, fdi.options)
         except Exception as error:  # a plug-in may raise anything, and the comparison continues
             trial.failures.append(f"{scheme}, on a recorded flight: {type(error).__name__}: {error}")
-    return trial
 
 
 def _fly(scenario: Scenario, entry: Entry, chosen: TunedValuesByGrade) -> Result:

@@ -14,7 +14,7 @@ Two files are written: `tuned.json` has the values to fly with, `tuning.json` th
 """
 
 import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from operator import attrgetter
@@ -33,19 +33,11 @@ from beaver_ftc.documents.files import read_json
 from beaver_ftc.plugins import DETECTORS, LAWS, Range, is_compiled, options_of, plugin_class, tunable
 from beaver_ftc.results.model import Document
 from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.studies.compare.criteria import (
-    FAILED,
-    INADMISSIBLE,
-    DetectorCost,
-    LawCost,
-    flights,
-    least_margins,
-)
+from beaver_ftc.studies.compare.criteria import INADMISSIBLE, DetectorCost, LawCost, flights, least_margins
 from beaver_ftc.studies.compare.gain import gain_of
 from beaver_ftc.studies.compare.search import Values, search, value_at
 from beaver_ftc.studies.compare.trial import STATISTICAL
 from beaver_ftc.studies.engine.study import Progress, fly_all
-from beaver_ftc.studies.present.tables import Columns, aligned, tabulated
 
 PROCEDURE = "beaver-ftc compare --tune; docs/results/benchmark.md"
 LEAST_GAIN = 0.05  # share of the cost at the start
@@ -117,8 +109,8 @@ def tune(methods: Sequence[Method], how: Search, workers: int, progress: Progres
         raise BadInput("compare --tune: nothing to tune, allowed: methods that declare `tunable`")
     rows = fly_all(partial(tune_method, how=how), methods, workers, progress)
     grades: Document = {}
-    for method, row in zip(methods, rows, strict=True):
-        grades.setdefault(method.grade, {}).setdefault(row["kind"], {})[method.name] = row["values"]
+    for row in rows:
+        grades.setdefault(row["grade"], {}).setdefault(row["kind"], {})[row["name"]] = row["values"]
     return {
         "procedure": PROCEDURE,
         "trials": how.trials,
@@ -140,11 +132,9 @@ def tune_method(method: Method, how: Search) -> Document:
     settings are compared.
     """
     flown_on = method.grade, how.most, how.draw, how.draws
-    cost = (
-        DetectorCost(method.name, flights(*flown_on))
-        if method.group == DETECTORS
-        else LawCost(method.name, *flown_on)
-    )
+    cases = flights(*flown_on)
+    is_law = method.group == LAWS
+    cost = LawCost(method.name, *flown_on) if is_law else DetectorCost(method.name, cases)
     start = method.start()
     result = search(cost, method.ranges(), start, how.trials, how.seed, how.restarts)
     gains = result.cost < (1.0 - LEAST_GAIN) * result.start_cost
@@ -155,7 +145,7 @@ def tune_method(method: Method, how: Search) -> Document:
         "name": method.name,
         **asdict(result),
         "values": values,
-        "flights": len(flights(*flown_on)),
+        "flights": len(cases),
     }
     if isinstance(cost, LawCost):
         row["gain_margin_db"], row["phase_margin_deg"] = least_margins(cost.margins(values))
@@ -183,60 +173,3 @@ def read_tuned(path: Path) -> Document:
         return dict(grades)
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise BadInput(f"{path}: cannot be read, allowed: a file that compare --tune wrote") from error
-
-
-def as_text(document: Document) -> str:
-    """A line for each method and grade; then remarks about widened ranges, searches that found nothing
-    better, and searches that the budget ended."""
-    columns = (*COLUMNS, *(GAINS if document["draw"] else ()), VALUES)
-    table, rows = tabulated(columns, document["methods"])
-    remarks = [sentence for row in document["methods"] for sentence in _remarks(row)]
-    head = (
-        f"up to {document['trials']} trials a search, seed {document['seed']}, "
-        f"up to {document['restarts']} restarts for each method and grade"
-    )
-    return "\n".join([head, "", aligned([table, *rows]), *remarks])
-
-
-def _remarks(row: Document) -> Iterator[str]:
-    """What a reader should know about a search, a sentence each."""
-    who = f"{row['name']}, {row['grade']}"
-    if row["widened"]:
-        yield f"{who}: on the edge of its range, widened: {', '.join(row['widened'])}"
-    if row["cost"] >= row["start_cost"]:
-        yield f"{who}: no better values were found in {row['trials']} trials"
-    if not row["settled"]:
-        yield f"{who}: the budget ended the search; more --restarts may find a lower cost"
-
-
-def _cost_text(cost: float) -> str:
-    """A cost as text; in words for a candidate that is inadmissible or cannot be flown."""
-    if cost >= FAILED:
-        return "cannot fly"
-    if cost >= INADMISSIBLE:
-        return "inadmissible"
-    return f"{cost:.3f}"
-
-
-def _if_any(form: Callable[[float], str], key: str) -> Callable[[Document], str]:
-    """The cell of a number; `-` in a row that does not have it."""
-    return lambda row: form(row[key]) if key in row else "-"
-
-
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.1f}"
-
-
-COLUMNS: Columns = (
-    ("grade", "grade"), ("method", "name"), ("cost at the start", "start_cost", _cost_text),
-    ("cost found", "cost", _cost_text),
-    ("margins dB, deg", lambda row: "{gain_margin_db:.1f}, {phase_margin_deg:.0f}".format(**row)
-     if "gain_margin_db" in row else "-"),
-)  # fmt: skip
-# Columns of methods that were tuned again: both costs on other flights, and the gain with its interval.
-GAINS: Columns = (
-    ("cost, built in", _if_any(_cost_text, "built_in")), ("cost, retuned", _if_any(_cost_text, "retuned")),
-    ("gain, %", _if_any(_percent, "gain")), ("from, %", _if_any(_percent, "gain_low")),
-    ("to, %", _if_any(_percent, "gain_high")),
-)  # fmt: skip
-VALUES = ("values", lambda row: ", ".join(f"{key} {value:.4g}" for key, value in row["values"].items()))

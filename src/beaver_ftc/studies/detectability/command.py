@@ -33,7 +33,8 @@ from beaver_ftc.studies.detectability import (
     schemes_shown,
     sizes_shown,
 )
-from beaver_ftc.studies.detectability.schemes import GRIDS, Grid, Watched
+from beaver_ftc.studies.detectability.grid import GRIDS, Grid
+from beaver_ftc.studies.detectability.schemes import Watched
 from beaver_ftc.studies.detectability.shown import NAME
 from beaver_ftc.studies.detectability.sizes import Request, sizes_study
 from beaver_ftc.studies.engine.study import Study, run_into

@@ -1,9 +1,8 @@
-"""The losses that are certain to be found, by places: as sentences, a table, a figure and files."""
+"""The losses that are certain to be found, by places: as sentences, a table and files."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
 from math import ceil
 from operator import itemgetter
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,14 +10,11 @@ from beaver_ftc.results.expectations import MOTION_OF_AXIS
 from beaver_ftc.results.model import Document
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.detectability.certain import AMPLITUDES, DETECT_WITHIN_S, ISOLATE_WITHIN_S, axis_of
+from beaver_ftc.studies.detectability.figures import draw_pairs
 from beaver_ftc.studies.detectability.isolability import DISTINGUISHED_LOSS
-from beaver_ftc.studies.detectability.shown import NAME, Line, table
-from beaver_ftc.studies.present.figures import heat_map, label_edges, panels
-from beaver_ftc.studies.present.page import Makers, Part, Pictures, study_files
-from beaver_ftc.studies.present.tables import grouped, percent, seconds
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from beaver_ftc.studies.detectability.shown import NAME, Line, span, table, times_reference
+from beaver_ftc.studies.present.page import Makers, Page, Pictures, study_files
+from beaver_ftc.studies.present.tables import grouped, known_values, percent, seconds
 
 Rows = Sequence[Document]
 CERTAIN = (
@@ -29,43 +25,38 @@ CERTAIN = (
 )
 
 
-def page_of(document: Document) -> tuple[str, Sequence[Part]]:
+def page_of(document: Document) -> Page:
     """The title, and the parts of the page: sentences, table, notes and picture."""
-    points_by_fault = sorted(document["points"], key=itemgetter("fault"))
-    points = grouped(points_by_fault, "fault", "excitation").items()
-    lines = [
-        {"loss of": fault, "flown": _times(scale)} | _spans(rows, "isolated")
-        for (fault, scale), rows in points
-    ]
-    pairs = sorted(document["pairs"], key=itemgetter("fault", "other"))
-    for (fault, other, scale), rows in grouped(pairs, "fault", "other", "excitation").items():
-        cells = _spans(rows, "magnitude") | {
-            "delay": _span(rows, "longest_s", seconds), "half: delay": _span(rows, "median_s", seconds),
-            "doublet": _span(rows, "doublet_deg", lambda deg: f"{deg:.1f} deg"),
-            "doublet time": _span(rows, "doublet_s", seconds),
-        }  # fmt: skip
-        lines.append({"loss of": fault, "taken for": other, "flown": _times(scale), **cells})
+    points, pairs = document["points"], document["pairs"]
     picture = Pictures([("smallest loss that is distinguished from each other surface", NAME)])
-    sentences = conclusions(document["points"])
-    return f"Detectability: {document['scenario']}", [*sentences, table(lines), CERTAIN, picture]
+    lines = [*_lines_of_faults(points), *_lines_of_pairs(pairs)]
+    title = f"Detectability: {document['scenario']}"
+    return title, [*conclusions(points), table(lines), CERTAIN, picture]
 
 
-def _times(scale: float) -> str:
-    """The excitation in words."""
-    return f"{scale:g} x reference"
+def _lines_of_faults(points: Rows) -> Iterator[Line]:
+    """A line for each fault and excitation."""
+    by_fault = sorted(points, key=itemgetter("fault"))
+    for (fault, scale), rows in grouped(by_fault, "fault", "excitation").items():
+        yield {"loss of": fault, "flown": times_reference(scale)} | _certain_from(rows, "isolated")
 
 
-def _spans(rows: Rows, key: str) -> Line:
+def _lines_of_pairs(pairs: Rows) -> Iterator[Line]:
+    """A line for each fault, other fault and excitation."""
+    by_fault = sorted(pairs, key=itemgetter("fault", "other"))
+    for (fault, other, scale), rows in grouped(by_fault, "fault", "other", "excitation").items():
+        yield {
+            "loss of": fault, "taken for": other, "flown": times_reference(scale),
+            **_certain_from(rows, "magnitude"),
+            "delay": span(rows, "longest_s", seconds), "half: delay": span(rows, "median_s", seconds),
+            "doublet": span(rows, "doublet_deg", "{:.1f} deg".format),
+            "doublet time": span(rows, "doublet_s", seconds),
+        }  # fmt: skip
+
+
+def _certain_from(rows: Rows, key: str) -> Line:
     """The cells of a size at every instant, and at half of the instants."""
-    return {"certain from": _span(rows, key), "half of onsets from": _span(rows, f"{key}_median")}
-
-
-def _span(rows: Rows, key: str, form: Callable[[float], str] = percent) -> str:
-    """The smallest and the largest value over the places that have one; then (places with a value / all
-    places)."""
-    values = [row[key] for row in rows if row[key] is not None]
-    ends = dict.fromkeys(map(form, (min(values), max(values)))) if values else ["-"]
-    return f"{' to '.join(ends)} ({len(values)}/{len(rows)})"
+    return {"certain from": span(rows, key), "half of onsets from": span(rows, f"{key}_median")}
 
 
 def conclusions(rows: Rows) -> list[str]:
@@ -77,7 +68,7 @@ def conclusions(rows: Rows) -> list[str]:
 
 def _conclusion(fault: str, scale: float, rows: Rows) -> str:
     """The loss that is certain at all places where some loss is, and how many these are."""
-    certain = [row["isolated"] for row in rows if row["isolated"] is not None]
+    certain = known_values(rows, "isolated")
     reference = "the scenario's references" if scale == 1.0 else f"{scale:g} times the scenario's references"
     if not certain:
         worst = min(rows, key=lambda row: (row["detected"] is not None, row["why"]))
@@ -112,32 +103,6 @@ def upwards(magnitude: float) -> str:
     """A magnitude in per cent, rounded up, so that a sentence guarantees no more than was found. Tables round
     to the nearest."""
     return f"{ceil(100.0 * magnitude - 1e-9)} %"
-
-
-def draw_pairs(document: Document) -> "Figure":
-    """A panel for each excitation. Rows: the surface that loses effectiveness; columns: the other surface."""
-    pairs = grouped(document["pairs"], "excitation")
-    faults = [*dict.fromkeys(row["fault"] for row in document["pairs"])]
-    title = (
-        f"{document['scenario']}: smallest loss distinguished from that of another surface, and places\n"
-        "(upper numbers: at half of the instants; lower numbers: at every instant; hatched: no loss)"
-    )
-    size = len(pairs) * (1.55 * len(faults) + 0.3) + 1.2, 0.65 * len(faults) + 1.6
-    figure, grid = panels(1, len(pairs), *size, title, sharey=True)
-    for axes, ((scale,), rows) in zip(grid[0], pairs.items(), strict=True):
-        values = np.full((len(faults), len(faults)), np.nan)
-        texts = {}
-        for (fault, other), places in grouped(rows, "fault", "other").items():
-            at = (faults.index(fault), faults.index(other))
-            at_half = [row["magnitude_median"] for row in places]
-            values[at] = np.nan if None in at_half else max(at_half)
-            texts[at] = "\n".join(reversed(_spans(places, "magnitude").values())), "black"
-        look: dict[str, Any] = {"cmap": "viridis_r", "vmin": 0.0, "vmax": 1.0, "alpha": 0.6}
-        image = heat_map(axes, values, texts, faults, faults, fontsize=7, **look)
-        axes.set_title(_times(scale), fontsize=9)
-    label_edges(grid, "taken for", ["loss of"])
-    figure.colorbar(image, ax=grid, label="smallest loss (half), share", shrink=0.6)
-    return figure
 
 
 FILES: Makers = study_files(

@@ -1,11 +1,10 @@
-"""From the traces of a survey to its document.
+"""From the rows of a survey to its document: probabilities of detection, and schemes against one another.
 
-Alarm levels are chosen on the healthy flights, so that all schemes have the same rate of false alarms. At
-these levels, each faulted flight gives a row for each scheme. Groups of rows give probabilities of detection,
-and pairs of schemes are compared.
+At the common rate of false alarms (levels.py), each faulted flight has a row for each scheme. Groups of rows
+give probabilities of detection, and pairs of schemes are compared.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from itertools import product
 from statistics import fmean
@@ -14,82 +13,20 @@ from beaver_ftc.diagnosis.informed_test import detection_probability
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.results.metrics import versions
 from beaver_ftc.results.model import Document
-from beaver_ftc.studies.compare.replay import Trace, alarms_at
-from beaver_ftc.studies.detectability.schemes import BUILT_IN, WATCHED_S, WITHIN_S, Grid, Watched
-from beaver_ftc.studies.engine.statistics import binomial, duel, or_never, poisson, share_within
+from beaver_ftc.studies.detectability.grid import WATCHED_S, WITHIN_S, Grid
+from beaver_ftc.studies.detectability.levels import Row, first_traces, level_for, level_line, rows_of
+from beaver_ftc.studies.detectability.schemes import BUILT_IN, Watched
+from beaver_ftc.studies.engine.statistics import binomial, duel, or_never, share_within
 from beaver_ftc.studies.present.page import Summary
 from beaver_ftc.studies.present.tables import finite, grouped
 
-Row = Document
 Rows = Sequence[Row]
-COLUMNS = (
-    "sensors", "turbulence", "excitation_deg_s", "seed", "surface", "magnitude", "scheme", "false_alarm",
-    "delay_s", "own_false_alarm", "own_delay_s", *(f"deflection_{s:g}" for s in WITHIN_S),
-)  # fmt: skip
 PLACE = ("sensors", "turbulence", "surface")
 CELL = (*PLACE, "excitation_deg_s", "magnitude", "scheme")
-Key = tuple[str, str, str]  # sensors, turbulence and scheme
 BySeed = dict[int, int]  # number of faults found, by seed
 SIGNIFICANT = 0.05  # with a smaller p, a scheme counts as better or worse
 JUDGED_S = 1.0  # the delay within which figures and comparisons count what is detected
 DUELS_S = (JUDGED_S, WATCHED_S)
-
-
-def level_for(healthy: Sequence[Trace], per_h: float) -> float:
-    """The lowest level with at most `per_h` false alarms per hour. A flight has at most one, when its
-    statistic before the fault exceeds the level: only these values, `before`, can be the level."""
-    best, *others = sorted({trace.before for trace in healthy}, reverse=True)
-    for level in others:
-        alarms, hours = alarms_at(healthy, level)
-        if alarms > per_h * hours + 1e-9:
-            break
-        best = level
-    return best
-
-
-def _counted(traces: Sequence[Trace], level: float) -> Document:
-    """False alarms at a level, and their rate with exact limits."""
-    alarms, hours = alarms_at(traces, level)
-    rates = vars(poisson(alarms, hours)).values()
-    names = ("per_h", "per_h_low", "per_h_high")
-    return {"alarms": alarms, "hours": hours, **dict(zip(names, map(finite, rates), strict=True))}
-
-
-def _first_traces(watched: Iterable[Watched]) -> dict[Key, list[Trace]]:
-    """The first trace of each block and scheme, by condition. All flights of a block are the same before the
-    fault."""
-    first: dict[Key, list[Trace]] = {}
-    for outcome in watched:
-        for scheme, traces in outcome.traces.items():
-            first.setdefault((*outcome.block.condition, scheme), []).append(traces[0])
-    return first
-
-
-def rows_of(faulted: Iterable[Watched], levels: dict[Key, float]) -> list[Row]:
-    """A row for each flight and scheme. Schemes without a level, and blocks that our own schemes could not
-    fly, have no rows: the failures have the reasons. Flights that end before their fault have none either.
-
-    delay_s: at the level of the common rate. own_delay_s: at level 1, with which the scheme ships. None
-    without an alarm. An alarm before the fault is a false_alarm and no detection.
-    """
-    rows = []
-    for outcome in faulted:
-        block = outcome.block
-        for scheme, traces in outcome.traces.items() if outcome.deflections else ():
-            level = levels.get((*block.condition, scheme))
-            if level is None:
-                continue
-            for fault, trace, deflections in zip(outcome.faults, traces, outcome.deflections, strict=True):
-                if trace.faulted:
-                    place = *block.condition, block.excitation_deg_s, block.seed, *fault, scheme
-                    cells = *place, *_alarm(trace, level), *_alarm(trace, 1.0), *deflections
-                    rows.append(dict(zip(COLUMNS, cells, strict=True)))
-    return rows
-
-
-def _alarm(trace: Trace, level: float) -> tuple[bool, float | None]:
-    """Whether the alarm at a level is false; its delay, s, or None."""
-    return trace.false_alarm(level), finite(trace.delay_s(level))
 
 
 def summary(rows: Rows, own: bool = False) -> Document:
@@ -126,7 +63,7 @@ def informed_shares(rows: Rows, per_h: float) -> Document:
 def document_of(grid: Grid, healthy: Sequence[Watched], faulted: Sequence[Watched]) -> Summary:
     """The document, with the rows of `rows_of` behind it. Raises BadInput if no healthy flight could be
     judged."""
-    watched, faulted_traces = _first_traces(healthy), _first_traces(faulted)
+    watched, faulted_traces = first_traces(healthy), first_traces(faulted)
     failures = sorted({failure for outcome in (*healthy, *faulted) for failure in outcome.failures})
     if failures and not watched:
         raise BadInput(f"detectability: no flight could be judged: {failures[0]}")
@@ -141,15 +78,7 @@ def document_of(grid: Grid, healthy: Sequence[Watched], faulted: Sequence[Watche
         "watched_s": WATCHED_S,
         "false_alarms_per_h": grid.per_h,
         "levels": [
-            {
-                **dict(zip(("sensors", "turbulence", "scheme"), key, strict=True)),
-                "level": level,
-                "calibration": _counted(watched[key], level),
-                # on flights that did not set the level
-                "before_faults": _counted(faulted_traces[key], level) if key in faulted_traces else None,
-                "own_level": _counted(watched[key], 1.0),
-            }
-            for key, level in levels.items()
+            level_line(key, level, watched[key], faulted_traces.get(key, ())) for key, level in levels.items()
         ],
         "totals": _lines(
             rows, (*PLACE, "scheme"), lambda group: summary(group) | {"own_level": summary(group, own=True)}
@@ -161,12 +90,6 @@ def document_of(grid: Grid, healthy: Sequence[Watched], faulted: Sequence[Watche
         "versions": dict(versions()),
     }
     return Summary(document, rows)
-
-
-def title_of(sensors: str, turbulence: str) -> str:
-    """Sensors and turbulence in words."""
-    air = "still air" if turbulence == "none" else f"{turbulence} turbulence"
-    return f"{sensors} sensors, {air}"
 
 
 def _lines(rows: Rows, names: Sequence[str], summarise: Callable[[Rows], Document]) -> list[Document]:

@@ -1,40 +1,25 @@
-"""The share found in a grid of flights, by schemes: as sentences, a table, a figure and files."""
+"""The share found in a grid of flights, by schemes: as sentences, a table and files."""
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from itertools import product
 from operator import attrgetter
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
+from typing import Any
 
 from beaver_ftc.results.model import Document
-from beaver_ftc.results.style import SERIES
-from beaver_ftc.studies.compare.rivals import leader
-from beaver_ftc.studies.detectability.probabilities import (
-    JUDGED_S,
-    SIGNIFICANT,
-    Row,
-    informed_shares,
-    summary,
-    title_of,
-)
-from beaver_ftc.studies.detectability.schemes import BOTH, BUILT_IN, WATCHED_S, WITHIN_S
+from beaver_ftc.studies.compare.rivals import Standing, leader
+from beaver_ftc.studies.detectability.figures import INFORMED, draw_schemes
+from beaver_ftc.studies.detectability.grid import WATCHED_S, WITHIN_S, title_of
+from beaver_ftc.studies.detectability.probabilities import SIGNIFICANT
+from beaver_ftc.studies.detectability.schemes import BOTH, BUILT_IN
 from beaver_ftc.studies.detectability.shown import NAME, SOON, Line, table
-from beaver_ftc.studies.present.figures import GRID, draw_estimates, label_edges, marker, panels
-from beaver_ftc.studies.present.page import Part, Pictures, Summary, study_files
+from beaver_ftc.studies.present.page import Page, Pictures, study_files
 from beaver_ftc.studies.present.tables import bare_percent, grouped, percent, seconds
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
 OWN = ", default level"
-INFORMED = "informed test"
 _NO_DUEL = {"seeds_theirs": 0, "seeds_ours": 0, "p": 1.0}
 
 
-def page_of(document: Document) -> tuple[str, Sequence[Part]]:
+def page_of(document: Document) -> Page:
     """The title, and the parts of the page: sentences, picture, table and notes."""
     conditions = document["grid"]["conditions"]
     sentences = [
@@ -58,16 +43,17 @@ def _scheme_lines(document: Document, sensors: str, turbulence: str) -> Iterator
     """A line for each surface and scheme under a condition, our schemes also at their default level; then the
     informed test."""
     condition = {"sensors": sensors, "turbulence": turbulence}
+    levels = _matching(document["levels"], **condition)
     for surface in document["grid"]["surfaces"]:
         place = {"loss of": surface, "flown": title_of(sensors, turbulence)}
-        for level in _matching(document["levels"], **condition):
-            total = next(
-                _matching(document["totals"], **condition, scheme=level["scheme"], surface=surface), None
-            )
-            row = place | {"scheme": level["scheme"], "false alarms/h": _rate(level["calibration"])}
+        totals = _by_scheme(document, **condition, surface=surface)
+        for level in levels:
+            scheme = level["scheme"]
+            total = totals.get(scheme)
+            row = place | {"scheme": scheme, "false alarms/h": _rate(level["calibration"])}
             yield row | {"before faults/h": _rate(level["before_faults"])} | _share_cells(total)
-            if level["scheme"] in BUILT_IN:
-                row |= {"scheme": f"{level['scheme']}{OWN}", "false alarms/h": _rate(level["own_level"])}
+            if scheme in BUILT_IN:
+                row |= {"scheme": f"{scheme}{OWN}", "false alarms/h": _rate(level["own_level"])}
                 yield row | _share_cells(total and total["own_level"])
         for informed in _matching(document["limits"], **condition, surface=surface):
             shares = "/".join(map(bare_percent, informed["within"].values()))
@@ -87,26 +73,23 @@ def who_is_better(
 ) -> Iterator[str]:
     """A sentence for each surface under a condition: the scheme that finds most faults within `within_s`. Of
     our schemes, only BOTH is compared."""
-    condition = {"sensors": sensors, "turbulence": turbulence}
     soon = f"{within_s:g}"
     for surface in document["grid"]["surfaces"]:
-        place = condition | {"surface": surface}
-        rows = dict[str, Document]()
-        for total in _matching(document["totals"], **place):
-            scheme = total["scheme"]
-            if total["flights"] and (scheme == BOTH or scheme not in BUILT_IN):
-                estimate = total["within"][soon]
-                pair = {"against": scheme, "ours": BOTH, "within_s": within_s}
-                line = next(_matching(document["comparison"], **place, **pair), _NO_DUEL)
-                duel = {"better": line["seeds_theirs"], "worse": line["seeds_ours"], "p": line["p"]}
-                rates = {
-                    "rate": estimate["value"],
-                    "rate_low": estimate["low"],
-                    "rate_high": estimate["high"],
-                }
-                rows[scheme] = rates | {"against_ours": duel}
-        if BOTH in rows:
-            yield leader(rows, BOTH, "rate", f"{surface}, found within {soon} s", percent)
+        place = {"sensors": sensors, "turbulence": turbulence, "surface": surface}
+        against_both = _matching(document["comparison"], **place, ours=BOTH, within_s=within_s)
+        duel_of = {line["against"]: line for line in against_both}
+        standings = {
+            scheme: Standing([*total["within"][soon].values()], _duel(duel_of.get(scheme, _NO_DUEL)))
+            for scheme, total in _by_scheme(document, **place).items()
+            if total["flights"] and (scheme == BOTH or scheme not in BUILT_IN)
+        }
+        if BOTH in standings:
+            yield leader(standings, BOTH, f"{surface}, found within {soon} s", percent, more_is_better=True)
+
+
+def _duel(line: Document) -> Document:
+    """A comparison with ours, from the side of the other scheme."""
+    return {"better": line["seeds_theirs"], "worse": line["seeds_ours"], "p": line["p"]}
 
 
 def comparison(document: Document) -> list[str]:
@@ -122,9 +105,14 @@ def comparison(document: Document) -> list[str]:
     return sentences
 
 
-def _matching(lines: Sequence[Document], **where: Any) -> Iterator[Document]:
+def _by_scheme(document: Document, **place: str) -> dict[str, Document]:
+    """The totals of a place, by scheme."""
+    return {total["scheme"]: total for total in _matching(document["totals"], **place)}
+
+
+def _matching(lines: Sequence[Document], **where: Any) -> list[Document]:
     """The lines that have all these values."""
-    return (line for line in lines if where.items() <= line.items())
+    return [line for line in lines if where.items() <= line.items()]
 
 
 def _rate(alarms: Document | None) -> str:
@@ -151,63 +139,6 @@ def _legend(document: Document) -> list[str]:
         f"{INFORMED}: knows surface, magnitude and instant, and the gusts that the vanes show; made once in "
         "that time at the same rate. Plug-ins are given every reading that the statistical scheme uses.",
     ]
-
-
-def draw_schemes(document: Summary) -> "Figure":
-    """A row of panels for each condition, a column for each surface. In a panel, each scheme has a line of
-    dots: the share detected of each magnitude."""
-    rows: Sequence[Row] = document.behind
-    surfaces = document["grid"]["surfaces"]
-    conditions = document["grid"]["conditions"]
-    names = [*dict.fromkeys(row["scheme"] for row in rows), INFORMED]
-    rate = f"at most {document['false_alarms_per_h']:g} false alarms per hour"
-    figure, axes = panels(
-        len(conditions), len(surfaces), 2.3 * len(surfaces) + 1.7,
-        (0.3 * len(names) + 0.6) * len(conditions) + 1.2, f"Loss of effectiveness, {rate}, all references",
-        dpi=120, sharex=True, sharey=True,
-    )  # fmt: skip
-    rows_of_panel = grouped(rows, "sensors", "turbulence", "surface")
-    for panel, (condition, surface) in zip(axes.flat, product(conditions, surfaces), strict=True):
-        _draw(panel, rows_of_panel.get((*condition, surface), []), names, document)
-    label_edges(
-        axes, f"detected within {JUDGED_S:g} s, %",
-        [title_of(*condition).replace(", ", ",\n") for condition in conditions], surfaces,
-    )  # fmt: skip
-    n_excitations = len(document["grid"]["excitations_deg_s"])
-    flights = [n_excitations * cell["flights"] for cell in document["cells"]]
-    figure.legend(
-        *axes[0][0].get_legend_handles_labels(), loc="outside lower center",
-        ncols=len(document["grid"]["magnitudes"]), fontsize=8, frameon=False, title_fontsize=8,
-        title=f"of {min(flights, default=0)} to {max(flights, default=0)} flights, exact 95 % interval",
-    )  # fmt: skip
-    return figure
-
-
-def _draw(panel: "Axes", rows: Sequence[Row], names: Sequence[str], document: Document) -> None:
-    """The share that each scheme detects, with its exact 95 % interval, and that of the informed test.
-    Magnitudes are drawn below one another, `apart` from line to line."""
-    magnitudes = document["grid"]["magnitudes"]
-    within = f"{JUDGED_S:g}"
-    apart = 0.6 / len(magnitudes)
-    for place, magnitude in enumerate(magnitudes):
-        rows_of_magnitude = [row for row in rows if row["magnitude"] == magnitude]
-        cells = {scheme: summary(group) for (scheme,), group in grouped(rows_of_magnitude, "scheme").items()}
-        shares = {scheme: cell["within"][within] for scheme, cell in cells.items() if cell["flights"]}
-        if rows_of_magnitude:
-            informed = informed_shares(rows_of_magnitude, document["false_alarms_per_h"])[within]
-            shares[INFORMED] = {"value": informed, "low": informed, "high": informed}
-        lines = [names.index(name) + apart * (place - 0.5 * (len(magnitudes) - 1)) for name in shares]
-        draw_estimates(
-            panel, lines, [*shares.values()], 100.0, across=True, linestyle="none", marker=marker(place),
-            markersize=4.5, color=SERIES[place], elinewidth=1.0, clip_on=False,
-            label=f"{100 * magnitude:g} % lost",
-        )  # fmt: skip
-    panel.set_yticks(range(len(names)), names)
-    panel.set_ylim(len(names) - 0.5, -0.5)
-    panel.set_xlim(-2, 102)
-    panel.grid(axis="x", alpha=0.3)
-    panel.hlines(np.arange(len(names) - 1) + 0.5, -2, 102, color=GRID, linewidth=0.6)
-    panel.tick_params(labelsize=8)
 
 
 FILES = study_files(NAME, page_of, {NAME: attrgetter("behind")}, {NAME: draw_schemes})

@@ -7,12 +7,10 @@ for the requested time to pass before the end.
     found      an alarm within the requested time
     certain    within this time, detection is guaranteed (`guaranteed_delay_s` of the metrics)
 
-A variant has the same flights with one change. If one error is left out of scenario and declaration, the
-variant shows how much this error limits the detection. With another reference, it shows whether the reference
-helps.
+The variants of the scenario (variants.py) have the same flights with one change.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, NamedTuple
@@ -23,25 +21,19 @@ from beaver_ftc.documents.errors import BadInput, BeaverFtcError
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.metrics import measure, versions
 from beaver_ftc.results.model import Document
-from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.signals import TIME_TOLERANCE_S
 from beaver_ftc.studies.detectability import sizes_shown
-from beaver_ftc.studies.detectability.certain import AMPLITUDES, SETTLED_S, axis_of
-from beaver_ftc.studies.detectability.places import scaled
+from beaver_ftc.studies.detectability.certain import SETTLED_S
 from beaver_ftc.studies.detectability.shown import NAME
 from beaver_ftc.studies.detectability.thresholds import LARGEST, STAGES, size_for_all, threshold
+from beaver_ftc.studies.detectability.variants import AS_IT_IS, variants_of
 from beaver_ftc.studies.engine.draws import loss
 from beaver_ftc.studies.engine.statistics import CONFIDENCE, counted, or_never
 from beaver_ftc.studies.engine.study import FlyRound, Study
-from beaver_ftc.studies.present.tables import finite
+from beaver_ftc.studies.present.tables import finite, sum_of, values_of
 
 SHARE = 0.9  # of the flights in which a loss of the size is found
-AS_IT_IS = "as it is"
-NOTHING = {"p": 0.0, "q": 0.0, "r": 0.0}
-# The sine that is added to an axis without a reference.
-ADDED_DEG_S = 3.0
-ADDED_HZ = 0.25
 FIRST = STAGES[:1]  # number of flights of a comparison, and of the size that is certain
 
 
@@ -83,7 +75,7 @@ class _Flown:
 
     def flags_of(self, variant: str, key: str, runs: Sequence[int], size: int) -> list[bool]:
         """The flag `key` of each of these flights."""
-        return [row[key] for row in self.rows_of(variant, runs, size)]
+        return values_of(self.rows_of(variant, runs, size), key)
 
 
 def sizes_study(scenario: Scenario, request: Request, tell: Callable[[str], None]) -> Study:
@@ -146,53 +138,6 @@ def _row(**fields: Any) -> Document:
     return {**flags, "inconclusive": None, "bound_used": 0.0, **fields}
 
 
-def variants_of(scenario: Scenario, surface: str) -> Iterator[tuple[str, Scenario]]:
-    """(name, scenario) of each variant; the first is the scenario as it is."""
-    for name, change in ((AS_IT_IS, {}), *_left_out(scenario), *_other_references(scenario, surface)):
-        yield name, scenario.with_({"faults": [], "expect": {}, **change})
-
-
-def _left_out(scenario: Scenario) -> Iterator[tuple[str, Document]]:
-    """(name, changed keys) of variants without an error that may hide a fault, in flight and in the
-    declaration."""
-    declared = Declared.of(scenario)
-    environment = scenario.environment
-    if environment.is_turbulent or environment.gusts or declared.air.moves:
-        yield "without turbulence", {"environment": {}, "fdi.bounds.turbulence": "none"}
-    if not (scenario.sensors.is_ideal and declared.sensors.is_ideal):
-        yield (
-            "with perfect sensors",
-            {"sensors": "ideal", "fdi.bounds.sensors": "ideal", "design_model.sensors": None},
-        )
-    if not (scenario.actuators.is_ideal and declared.servo_errors.is_none):
-        no_errors = {
-            "fdi.bounds.deflection_deg": 0.0,
-            "fdi.bounds.actuators": {},
-            "design_model.actuators": None,
-        }
-        yield "with perfect servos", {"actuators": "ideal", "uncertainty.actuators": {}, **no_errors}
-    exact = {"coefficients": 0.0, "inertia": 0.0, "inertia_coupling": NOTHING, "constant_rad_s2": NOTHING}
-    no_bounds = {f"fdi.bounds.{key}": value for key, value in exact.items()}
-    yield "without uncertainty of the model", {"uncertainty": {}, **no_bounds}
-
-
-def _other_references(scenario: Scenario, surface: str) -> Iterator[tuple[str, Document]]:
-    """(name, changed keys) of variants with a larger or faster reference on the axis of the largest effect of
-    the surface; with a sine, if this axis has no reference."""
-    axis = axis_of(scenario, surface)
-    signals = scenario.model_dump(mode="json", exclude_none=True)["reference"].get(axis, [])
-    for quantity, keys in (("amplitude", AMPLITUDES), ("frequency", _FREQUENCIES)):
-        if (twice := scaled(signals, keys, 2.0)) != signals:
-            yield f"with twice the {quantity} of reference.{axis}", {f"reference.{axis}": twice}
-    if not signals:
-        sine = {"amplitude_deg_s": ADDED_DEG_S, "frequency_hz": ADDED_HZ}
-        label = f"with a sine of {ADDED_DEG_S:g} deg/s and {ADDED_HZ:g} Hz as reference.{axis}"
-        yield label, {f"reference.{axis}": [{"sine": sine}]}
-
-
-_FREQUENCIES = ("frequency_hz", "start_frequency_hz", "end_frequency_hz")
-
-
 def _document(scenario: Scenario, request: Request, variants: dict[str, Scenario], flown: _Flown) -> Document:
     """Fly all variants; the answer for the scenario as it is, and under `compared` those for the others.
     inconclusive, bound_used: of the flights of the scenario as it is."""
@@ -211,7 +156,7 @@ def _document(scenario: Scenario, request: Request, variants: dict[str, Scenario
         **answer,
         "compared": compared,
         "inconclusive": reasons,
-        "bound_used": float(np.median([row["bound_used"] for row in rows])),
+        "bound_used": float(np.median(values_of(rows, "bound_used"))),
         "flights_flown": len(flown.rows),
         "versions": dict(versions()),
     }
@@ -231,7 +176,7 @@ def _answer(variant: str, flown: _Flown, stages: Sequence[int]) -> Document:
             for key, size in vars(found_size).items()
         },
         "certain": {"size": finite(certain_size / LARGEST), "flights": stages[0], "at_total_loss": n_certain},
-        "total_loss": counted(sum(row["found"] for row in total), len(total)),
-        "false_alarms": sum(row["false_alarm"] for row in total),
-        "failed": sum(row["failed"] for row in total),
+        "total_loss": counted(sum_of(total, "found"), len(total)),
+        "false_alarms": sum_of(total, "false_alarm"),
+        "failed": sum_of(total, "failed"),
     }

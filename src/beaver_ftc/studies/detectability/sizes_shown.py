@@ -6,7 +6,7 @@ from math import inf
 from beaver_ftc.results.hints import NEAR_THRESHOLD_SHARE
 from beaver_ftc.results.model import Document
 from beaver_ftc.studies.detectability.shown import NAME, table
-from beaver_ftc.studies.present.page import Makers, Part, study_files
+from beaver_ftc.studies.present.page import Makers, Page, study_files
 from beaver_ftc.studies.present.tables import bare_percent, percent
 
 NOT_FOUND = (  # key of a number of flights; the end of the sentence about one flight, and about several
@@ -23,7 +23,7 @@ NOT_FOUND = (  # key of a number of flights; the end of the sentence about one f
 )
 
 
-def page_of(document: Document) -> tuple[str, Sequence[Part]]:
+def page_of(document: Document) -> Page:
     """The title, and the parts of the page: sentences and table."""
     lines = [
         {
@@ -35,7 +35,7 @@ def page_of(document: Document) -> tuple[str, Sequence[Part]]:
         }
         for row in _variants(document)
     ]  # fmt: skip
-    title = f"Detectability: {document['surface']} of {document['scenario']}"
+    title = "Detectability: {surface} of {scenario}".format(**document)
     return title, [*_sentences(document), table(lines)]
 
 

@@ -10,7 +10,8 @@ from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.log import Columns
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.studies.matrix.fault_matrix import FaultCase, informed_counts, scenario_of, trimmed_deg
+from beaver_ftc.studies.matrix.cells import informed_counts
+from beaver_ftc.studies.matrix.fault_matrix import FaultCase, scenario_of, trimmed_deg
 from beaver_ftc.studies.matrix.informed import columns_of, informed_row, term_acceleration
 from telling import apart
 

@@ -6,13 +6,7 @@ import pytest
 
 from beaver_ftc.design.fdc import SURFACES
 from beaver_ftc.studies.engine.study import run_study
-from beaver_ftc.studies.matrix.fault_matrix import (
-    AIRSPEEDS_MPS,
-    cases,
-    fly_case,
-    matrix_study,
-    verdict,
-)
+from beaver_ftc.studies.matrix.fault_matrix import AIRSPEEDS_MPS, cases, fly_case, matrix_study, verdict
 from samples import AT_NIGHT
 
 SPEEDS_MPS = AIRSPEEDS_MPS if AT_NIGHT else AIRSPEEDS_MPS[1:2]

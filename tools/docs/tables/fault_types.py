@@ -7,7 +7,8 @@ from typing import Any
 
 import beaver_ftc as bf
 from beaver_ftc.studies.engine.study import run_study
-from beaver_ftc.studies.matrix.fault_matrix import cases, fly_case, informed_counts, matrix_study
+from beaver_ftc.studies.matrix.cells import informed_counts
+from beaver_ftc.studies.matrix.fault_matrix import cases, fly_case, matrix_study
 from beaver_ftc.studies.matrix.matrix_shown import SHOWN
 from beaver_ftc.studies.present.tables import markdown_table
 

@@ -11,7 +11,6 @@ fault on a surface, with the worst result over the airspeeds.
     WRONG      a false alarm, a wrong name or type, or the fault is excluded
 """
 
-from collections import Counter
 from functools import lru_cache
 from math import degrees
 from pathlib import Path
@@ -31,8 +30,9 @@ from beaver_ftc.scenario.schema import load as load_scenario
 from beaver_ftc.studies.detectability.certain import axis_of
 from beaver_ftc.studies.detectability.places import usual_airspeeds
 from beaver_ftc.studies.engine.study import Study
+from beaver_ftc.studies.matrix.cells import document_of
 from beaver_ftc.studies.matrix.informed import columns_of, informed_row
-from beaver_ftc.studies.matrix.matrix_shown import FILES, NAME, VERDICTS
+from beaver_ftc.studies.matrix.matrix_shown import FILES, NAME
 from beaver_ftc.studies.reproduce.choices import SETTING
 
 TOLERANCE = 0.05  # of the coefficients, with declared errors
@@ -40,18 +40,13 @@ SENSORS = "tactical-grade"
 AIRSPEEDS_MPS = (38.0, 45.0, 52.0)
 AT_S = 12.0  # begin of the fault
 DURATION_S = 30.0
-NAMED = ("surface", "named")  # verdicts with the right surface
 DECLARED = "fault-matrix-declared"  # name of the folder with declared errors, in place of NAME
-LIKELY = 0.5  # above this probability, a fault counts as detected by the informed test
 REFERENCE, UNCERTAINTY = SETTING["reference"], SETTING["uncertainty"]
 
 # Name in the table, and keys of the fault. off_deg: a jam at this angle from the trimmed deflection.
 FAULTS: tuple[tuple[str, Document], ...] = tuple(
     (name, {"type": kind, **keys}) for kind, row in TYPES.items() for name, keys in row.examples
 )
-
-
-Rows = list[Document]  # rows of flights
 
 
 class FaultCase(NamedTuple):
@@ -211,97 +206,6 @@ def _tracking(flight: Landing, oracle: Landing, case: FaultCase) -> Document:
         "oracle_beyond_s": oracle.authority[axis]["beyond_s"] if oracle.authority else 0.0,
         "oracle_left_envelope_s": oracle.envelope_exits[0][0] if oracle.envelope_exits else None,
     }
-
-
-def document_of(rows: Rows) -> Document:
-    """The document of the matrix: cells, flights, wrong names and false alarms, and aircraft that only our
-    law lost."""
-    surfaces = dict.fromkeys(row["surface"] for row in rows)
-    informed = [row for row in rows if "told_chance" in row]
-    wrong = sum(row["verdict"] == "WRONG" for row in rows)
-    false_alarms = sum(row["false_alarm"] for row in rows)
-    return {
-        "aircraft": rows[0].get("aircraft"),
-        "cells": [_cell(fault, surface, rows) for fault, _ in FAULTS for surface in surfaces],
-        "flights": rows,
-        "wrong": wrong,
-        "false_alarms": false_alarms,
-        "lost_though_the_oracle_was_not": [
-            row for row in rows if row["departure_s"] is not None and row["oracle_departure_s"] is None
-        ],
-        "passed": not wrong and not false_alarms,
-        **({"told": informed_counts(informed)} if informed else {}),
-    }
-
-
-def informed_counts(rows: Rows) -> Document:
-    """The results of the flights in which the informed test detects the fault with a probability above
-    LIKELY.
-
-    named: the right surface is named. type_kept: of the detected faults, surface and type are named or not
-    excluded. Of all flights: flights, and detected_but_not_told, those that only the diagnosis detects.
-    """
-    seen = [row for row in rows if row["told_chance"] > LIKELY]
-    named = [row for row in seen if row["verdict"] in NAMED]
-    n_seen, n_named = (Counter(row["surface"] for row in group) for group in (seen, named))
-    surfaces = dict.fromkeys(row["surface"] for row in rows)
-    return {
-        "flights": len(rows),
-        "seen": len(seen),
-        "detected": sum(row["detected"] for row in seen),
-        "named": len(named),
-        "share": len(named) / len(seen) if seen else None,
-        "type_kept": sum(row["detected"] and row["verdict"] != "WRONG" for row in seen),
-        "by_surface": {s: {"seen": n_seen[s], "named": n_named[s]} for s in surfaces},
-        "detected_but_not_told": sum(row["detected"] and row["told_chance"] <= LIKELY for row in rows),
-    }
-
-
-def _cell(fault: str, surface: str, rows: Rows) -> Document:
-    """The worst results of a fault on a surface over the airspeeds, and numbers of flights. delay_s: None if
-    one flight has no delay."""
-    flights = [row for row in rows if (row["fault"], row["surface"]) == (fault, surface)]
-    delays = [row["delay_s"] for row in flights]
-    return {
-        "fault": fault,
-        "surface": surface,
-        "verdict": min((row["verdict"] for row in flights), key=VERDICTS.index),
-        "delay_s": None if None in delays else max(delays),
-        "candidates": sorted({candidate for row in flights for candidate in row["candidates"]}),
-        "ratio": max((row["ratio"] for row in flights if row["ratio"] is not None), default=None),
-        "lost": sum(row["departure_s"] is not None for row in flights),
-        "oracle_lost": sum(row["oracle_departure_s"] is not None for row in flights),
-        "flights": len(flights),
-        "remark": _remark(flights),
-        **(
-            {"told": sum(row["told_chance"] > LIKELY for row in flights)}
-            if "told_chance" in flights[0]
-            else {}
-        ),
-    }
-
-
-def _reason(lost: Rows) -> str:
-    """The reason of the loss of the aircraft, from the flights of the oracle; if these show none, the signal
-    that diverged in the first flight with our law."""
-    beyond_s = max(row["oracle_beyond_s"] for row in lost)
-    if beyond_s > 0.0:
-        return f"for {beyond_s:.1f} s no deflection could hold the {lost[0]['axis']} rate"
-    left_s = [row["oracle_left_envelope_s"] for row in lost if row["oracle_left_envelope_s"] is not None]
-    if left_s:
-        return f"the validated envelope was left at {min(left_s):.1f} s, the outer loops being open"
-    return f"{lost[0]['departure_signal']} diverged"
-
-
-def _remark(flights: Rows) -> str:
-    """How many flights lose the aircraft, and the reason; or that no flight has an alarm."""
-    lost = [row for row in flights if row["departure_s"] is not None]
-    if lost:
-        oracle_lost = sum(row["oracle_departure_s"] is not None for row in lost)
-        return f"lost in {len(lost)} of {len(flights)} flights, the oracle in {oracle_lost}: {_reason(lost)}"
-    if all(not row["detected"] for row in flights):
-        return "no effect beyond the declared uncertainty: tracking is as before"
-    return ""
 
 
 def matrix_study(

@@ -1,18 +1,13 @@
 """The fault matrix as a text and as a heat map: a row for each fault, a column for each surface."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from beaver_ftc.results.metrics import as_json
 from beaver_ftc.results.model import Document
 from beaver_ftc.results.style import VERMILION
-from beaver_ftc.studies.present.figures import heat_map, label_edges, panels
+from beaver_ftc.studies.present.figures import Figure, heat_map, label_edges, panels
 from beaver_ftc.studies.present.page import Makers
-from beaver_ftc.studies.present.tables import grouped, percent
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from beaver_ftc.studies.present.tables import grouped, percent, values_of
 
 NAME = "fault-matrix"
 SHOWN = {
@@ -50,10 +45,9 @@ def as_text(document: Document) -> str:
     lost = [cell for cell in document["cells"] if cell["lost"]]
     remarks = ["* {surface} {fault}: {remark}".format(**cell) for cell in lost]
     totals = (
-        f"{len(document['flights'])} faults flown: {document['wrong']} named wrongly, "
-        f"{document['false_alarms']} false alarms, "
-        f"{len(document['lost_though_the_oracle_was_not'])} aircraft lost although the law oracle kept it"
-    )
+        "{} faults flown: {wrong} named wrongly, {false_alarms} false alarms, {} aircraft lost although the "
+        "law oracle kept it"
+    ).format(len(document["flights"]), len(document["lost_though_the_oracle_was_not"]), **document)
     informed = document.get("told")
     legend, share = (LEGEND + TOLD_LEGEND, [_informed_text(informed)]) if informed else (LEGEND, [])
     remark_lines = [*remarks, ""] if remarks else []
@@ -63,7 +57,7 @@ def as_text(document: Document) -> str:
 def _table(document: Document) -> tuple[list[str], dict[str, list[Document]]]:
     """The surfaces; and by fault, its cells in the order of the surfaces."""
     rows = {fault: cells for (fault,), cells in grouped(document["cells"], "fault").items()}
-    return [cell["surface"] for cell in next(iter(rows.values()))], rows
+    return values_of(next(iter(rows.values())), "surface"), rows
 
 
 def _cell_text(cell: Document) -> str:
@@ -78,17 +72,15 @@ def _informed_text(test: Document) -> str:
     """How many faults the informed test detects, and how many of these the diagnosis detects and names."""
     if not test["seen"]:
         return "the informed test, which knows the fault, detects none of them"
-    surfaces = ", ".join(
-        f"{s} {counts['named']} of {counts['seen']}" for s, counts in test["by_surface"].items()
-    )
+    surfaces = ", ".join("{} {named} of {seen}".format(s, **n) for s, n in test["by_surface"].items())
     return (
-        f"the informed test, which knows the fault, detects {test['seen']} of {test['flights']}. Of these "
-        f"the diagnosis detects {test['detected']},\nnames the right surface in {test['named']} "
-        f"({percent(test['share'])}: {surfaces}), and keeps the right type in {test['type_kept']}"
-    )
+        "the informed test, which knows the fault, detects {seen} of {flights}. Of these the diagnosis "
+        "detects {detected},\nnames the right surface in {named} ({}: {}), and keeps the right type in "
+        "{type_kept}"
+    ).format(percent(test["share"]), surfaces, **test)
 
 
-def heat_map_of(document: Document) -> "Figure":
+def heat_map_of(document: Document) -> Figure:
     """Colour and symbol show the verdict; the line below them has delay and tracking ratio."""
     from matplotlib.colors import ListedColormap
 

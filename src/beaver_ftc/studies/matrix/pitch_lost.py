@@ -19,7 +19,7 @@ from beaver_ftc.studies.engine.study import Study
 from beaver_ftc.studies.matrix.fault_matrix import AIRSPEEDS_MPS, AT_S, REFERENCE, UNCERTAINTY, trimmed_deg
 from beaver_ftc.studies.matrix.power_margins import margins
 from beaver_ftc.studies.present.page import Makers
-from beaver_ftc.studies.present.tables import aligned, tabulated
+from beaver_ftc.studies.present.tables import aligned, tabulated, values_of
 
 NAME = "pitch-lost"
 DURATION_S = 100.0
@@ -118,7 +118,7 @@ def document_of(rows: list[Document], airspeeds_mps: Sequence[float]) -> Documen
 
 def as_text(document: Document) -> str:
     """A table for each law, the margins of the linear model, and the totals."""
-    speeds = [margin["airspeed_mps"] for margin in document["margins"]]
+    speeds = values_of(document["margins"], "airspeed_mps")
     flights = {(row["law"], row["lost"], row["airspeed_mps"]): row for row in document["flights"]}
     tables = [
         aligned([
@@ -128,9 +128,9 @@ def as_text(document: Document) -> str:
         for law in LAWS
     ]  # fmt: skip
     totals = (
-        f"{len(document['flights'])} pairs of faults flown: {document['saved']} aircraft kept that are lost "
-        f"without engine power, {document['harmed']} lost that are kept without"
-    )
+        "{} pairs of faults flown: {saved} aircraft kept that are lost without engine power, {harmed} lost "
+        "that are kept without"
+    ).format(len(document["flights"]), **document)
     head, rows = tabulated(MARGINS, document["margins"])
     linear = aligned([head, *rows])
     return "\n\n".join([*tables, LEGEND, linear, totals])

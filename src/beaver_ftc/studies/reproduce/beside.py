@@ -9,7 +9,8 @@ from collections.abc import Mapping, Sequence
 from beaver_ftc.results.model import Document
 from beaver_ftc.studies.engine.statistics import or_never
 from beaver_ftc.studies.present.tables import number, percent
-from beaver_ftc.studies.reproduce.cases import AXIS, CASES, EDGES, HEALTHY, OURS, Changed, Flown, fly_case
+from beaver_ftc.studies.reproduce.cases import CASES, EDGES, HEALTHY, OURS, Changed, fly_case
+from beaver_ftc.studies.reproduce.flown import AXIS, Flown
 
 FAULTY = ("elevator", "aileron", "rudder", "unanticipated")  # names of cases
 SHOWN = (HEALTHY, *(CASES[name] for name in FAULTY))
@@ -125,8 +126,7 @@ def sentences(document: Document) -> list[str]:
 
 def alarms_sentence(document: Document) -> str:
     """The false alarms in a sentence."""
-    alarms = document["false_alarms"]
     return (
-        f"False alarms in {document['healthy_flights']} healthy flights at the corners and edges of the "
-        f"published uncertainty: {alarms['paper']} with the scheme of the paper, {alarms['ours']} with ours."
-    )
+        "False alarms in {healthy_flights} healthy flights at the corners and edges of the published "
+        "uncertainty: {false_alarms[paper]} with the scheme of the paper, {false_alarms[ours]} with ours."
+    ).format(**document)

@@ -2,8 +2,10 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, NamedTuple
 
+from beaver_ftc.documents.document import parse
 from beaver_ftc.documents.files import Document
 from beaver_ftc.documents.validation import parse_key, with_values
 from beaver_ftc.plugins import DETECTORS, LAWS, options_of
@@ -119,3 +121,8 @@ SETTING = _with_keys({}, {**GIVEN, **{choice.key: choice.value for choice in CHO
 def scenario(name: str, changes: Mapping[str, Any]) -> Scenario:
     """The scenario of the published setting with our choices. changes: values by dotted key."""
     return Scenario.model_validate(_with_keys({"name": name, **SETTING}, changes))
+
+
+def data_of(name: str) -> Document:
+    """The content of a YAML file of this folder."""
+    return parse(Path(__file__).with_name(name).read_text(encoding="utf-8")).data

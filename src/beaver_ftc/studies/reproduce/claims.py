@@ -14,19 +14,19 @@ the construction of the code are counted separately.
 
 from collections.abc import Callable, Mapping, Sequence
 from math import nan
-from pathlib import Path
 from typing import NamedTuple
 
 from beaver_ftc.aircraft import AXES
-from beaver_ftc.documents.document import parse
 from beaver_ftc.studies.reproduce import measures
-from beaver_ftc.studies.reproduce.cases import Changed, Flown
+from beaver_ftc.studies.reproduce.cases import Changed
+from beaver_ftc.studies.reproduce.choices import data_of
+from beaver_ftc.studies.reproduce.flown import Flown
 
 BORNE_OUT, NOT_BORNE_OUT = "borne out", "not borne out"
 STRONGER, CANNOT_BE_JUDGED = "stronger than the paper", "cannot be judged"
 VERDICTS = (STRONGER, BORNE_OUT, NOT_BORNE_OUT, CANNOT_BE_JUDGED)
 
-_FILE = parse(Path(__file__).with_name("claims.yaml").read_text(encoding="utf-8")).data
+_FILE = data_of("claims.yaml")
 REASONS: dict[str, str] = _FILE["reasons"]
 TAKES: dict[str, str] = {name: row["takes"] for name, row in _FILE["ablations"].items()}
 ABLATIONS = tuple(Changed(name, row["changes"]) for name, row in _FILE["ablations"].items())

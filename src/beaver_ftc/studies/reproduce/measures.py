@@ -16,9 +16,10 @@ from beaver_ftc.plant.linear import differences
 from beaver_ftc.scenario.faults import LossOfEffectiveness
 from beaver_ftc.studies.detectability.certain import mismatch, moments_of
 from beaver_ftc.studies.engine.statistics import or_never
-from beaver_ftc.studies.reproduce.cases import ESTIMATORS, SETTLED_S, Flown
 from beaver_ftc.studies.reproduce.choices import AMPLITUDE_DEG_S
+from beaver_ftc.studies.reproduce.flown import ESTIMATORS, Flown
 
+SETTLED_S = 2.0  # from the start or a fault to steady tracking: two time constants of the error
 TRANSIENT_S = 3.0  # time after the fault that contains detection, isolation and hand-over
 GOOD = 0.1  # the limit `good` of claims.yaml
 TAKEN_OVER = 0.2  # the limit `taken-over`
@@ -197,7 +198,7 @@ def _certain_at_s(flight: Flown) -> Iterator[tuple[str, float]]:
 def learnt_before(flight: Flown) -> float:
     """Largest output of the detection estimator's network before the alarm, rad/s2."""
     early = flight.log["detected"] == 0
-    return max(float(np.max(np.abs(flight.log[f"{a}_network_rad_s2"][early]))) for a in AXES)
+    return float(np.abs(flight.of_axes("{}_network_rad_s2")[:, early]).max())
 
 
 def unapproximated(flight: Flown) -> float:

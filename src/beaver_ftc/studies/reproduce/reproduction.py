@@ -18,40 +18,30 @@ from beaver_ftc.results.metrics import as_json, versions
 from beaver_ftc.results.model import Document
 from beaver_ftc.studies.engine.study import Study, run_into
 from beaver_ftc.studies.present.page import Makers, Summary
-from beaver_ftc.studies.present.tables import finite
+from beaver_ftc.studies.present.tables import sum_of
 from beaver_ftc.studies.reproduce import beside, truth_and_design
 from beaver_ftc.studies.reproduce.cases import (
-    BEYOND,
-    GAINS,
+    AS_PUBLISHED,
+    ELSEWHERE,
     PUBLISHED,
-    VARIANTS,
     Changed,
-    Flown,
     LazyFlights,
     fly_case,
 )
-from beaver_ftc.studies.reproduce.choices import CHOICES, OPTIONS, gains
-from beaver_ftc.studies.reproduce.claims import (
-    ABLATIONS,
-    BORNE_OUT,
-    CANNOT_BE_JUDGED,
-    CLAIMS,
-    MEASURED,
-    NOT_BORNE_OUT,
-    STRONGER,
-    TAKES,
-    VERDICTS,
-    Claim,
+from beaver_ftc.studies.reproduce.choices import CHOICES, OPTIONS
+from beaver_ftc.studies.reproduce.claims import ABLATIONS, MEASURED, NOT_BORNE_OUT, VERDICTS, Claim
+from beaver_ftc.studies.reproduce.flown import Flown
+from beaver_ftc.studies.reproduce.judged import (
+    counted_apart,
+    rows_of_ablations,
+    rows_of_claims,
+    rows_of_gains,
+    sensitivity_rows,
 )
 from beaver_ftc.studies.reproduce.published_figures import figures_of
 from beaver_ftc.studies.reproduce.words import NAME, as_html, as_markdown, as_text
 
-Rows = list[Document]
-Pair = tuple[float, float]  # number of a claim in a setting, and its number in the ablation
-BySetting = Mapping[str, list[Pair]]  # by name of the setting, the pair of each of MEASURED
 NUMBERS, ABLATED, SAME, FALSE_ALARM = "numbers", "without", "same", "false alarm"
-AS_PUBLISHED = Changed("as published", {})
-ELSEWHERE = (*BEYOND, *VARIANTS, *GAINS)  # settings that the paper did not fly
 SETTINGS = (AS_PUBLISHED, *ELSEWHERE)
 WITHOUT: Mapping[str, Changed] = {ablation.name: ablation for ablation in ABLATIONS}
 NO_ADAPTATION = {"fdi.options.adaptation_gain": 0.0}  # of the isolation estimators
@@ -117,25 +107,25 @@ def document_of(rows: Sequence[Document]) -> Summary:
         setting.name: row for (kind, setting), row in zip(STUDIED, rows, strict=True) if kind == NUMBERS
     }
     pairs_of = {name: list(zip(row[NUMBERS], row[ABLATED], strict=True)) for name, row in settings.items()}
-    claims = _claims(pairs_of)
+    claims = rows_of_claims(pairs_of)
     counts = Counter(row["verdict"] for row in claims)
     document = {
         "passed": all(row["verdict"] != NOT_BORNE_OUT or row["because"] for row in claims),
         "counts": {verdict: counts[verdict] for verdict in VERDICTS},
-        **_counted_apart(claims),
+        **counted_apart(claims),
         "adaptation": {
             "flights": len(beside.FAULTY) * len(SETTINGS),
-            "same": sum(row[SAME] for row in settings.values()),
+            "same": sum_of(settings.values(), SAME),
         },
         "claims": claims,
-        "ablations": _ablations(claims),
+        "ablations": rows_of_ablations(claims),
         "beside": beside.document_of(
             beside.fly_both(), [row[FALSE_ALARM] for row in rows if FALSE_ALARM in row]
         ),
         "truth_and_design": truth_and_design.document_of(truth_and_design.fly_designs()),
         "choices": [asdict(choice) for choice in (*CHOICES, *OPTIONS)],
-        "gains": _gains(pairs_of),
-        "sensitivity": _sensitivity(pairs_of),
+        "gains": rows_of_gains(pairs_of),
+        "sensitivity": sensitivity_rows(pairs_of),
         "cases": [
             {
                 "case": case.name,
@@ -147,142 +137,6 @@ def document_of(rows: Sequence[Document]) -> Summary:
         "versions": dict(versions()),
     }
     return Summary(document, flights)
-
-
-def _claims(pairs_of: BySetting) -> Rows:
-    """A row for each claim."""
-    judged = {
-        claim: _judged(claim, {name: pairs[i] for name, pairs in pairs_of.items()})
-        for i, claim in enumerate(MEASURED)
-    }
-    rows = []
-    for claim in CLAIMS:
-        outcome = judged.get(claim) or {
-            "verdict": CANNOT_BE_JUDGED, "reason": claim.reason, "because": "", "number": None,
-            "construction": False,
-        }  # fmt: skip
-        rows.append({"where": claim.where, "statement": claim.statement, **outcome})
-    return rows
-
-
-def _judged(claim: Claim, pair_of: Mapping[str, Pair]) -> Document:
-    """The row of a measured claim. pair_of: its pair of numbers by name of the setting. `lowest` and
-    `highest` are over ELSEWHERE; a claim with `because` has only its number in the published setting."""
-    number, number_without = pair_of[AS_PUBLISHED.name]
-    elsewhere = [] if claim.because else [pair_of[setting.name] for setting in ELSEWHERE]
-    measure = claim.measure
-    verdict = claim.verdict(number, number_without, elsewhere)
-    everywhere = [n for n, _ in elsewhere] or [number]
-    return {
-        "measure": measure.name,
-        "quantity": measure.quantity,
-        "unit": measure.unit,
-        "flights": list(claim.names),
-        "limit": claim.limit,
-        "limit_from": claim.source,
-        "at_least": measure.at_least,
-        "none": measure.none,
-        "number": finite(number),
-        "ablation": claim.ablation,
-        "without": TAKES[claim.ablation],
-        "number_without": finite(number_without),
-        "fails_without": not claim.holds(number_without),
-        "construction": claim.construction,
-        "lowest": finite(min(everywhere)),
-        "highest": finite(max(everywhere)),
-        "held_in": sum(claim.holds(n) for n, _ in elsewhere),
-        "borne_out_in": sum(claim.is_borne_out(*pair) for pair in elsewhere),
-        "elsewhere": len(elsewhere),
-        "verdict": verdict,
-        "because": claim.because if verdict == NOT_BORNE_OUT else "",
-        "reason": "",
-    }
-
-
-def _counted_apart(claims: Rows) -> Document:
-    """Counts of the statements that can be tested, with their verdicts; of those that are true by
-    construction; and of those without a measure. claims: the rows of `_claims`."""
-    tested = Counter(row["verdict"] for row in claims if not row["reason"] and not row["construction"])
-    built = [row["verdict"] != NOT_BORNE_OUT for row in claims if row["construction"]]
-    return {
-        "testable": {
-            "statements": tested.total(),
-            "hold": tested[STRONGER] + tested[BORNE_OUT],
-            "elsewhere": tested[STRONGER],
-            "do_not": tested[NOT_BORNE_OUT],
-            "unsettled": tested[CANNOT_BE_JUDGED],
-        },
-        "construction": {"statements": len(built), "hold": sum(built)},
-        "background": sum(bool(row["reason"]) for row in claims),
-    }
-
-
-def _ablations(claims: Rows) -> Rows:
-    """A row for each ablation: its changes, how many statements refer to its mechanism, and how many fail
-    without it. claims: the rows of `_claims`."""
-    rows = []
-    for ablation in ABLATIONS:
-        fails = [row["fails_without"] for row in claims if row.get("ablation") == ablation.name]
-        rows.append({
-            "ablation": ablation.name, "takes": TAKES[ablation.name], "changes": dict(ablation.changes),
-            "statements": len(fails), "fail": sum(fails),
-        })  # fmt: skip
-    return rows
-
-
-def _gains(pairs_of: BySetting) -> Rows:
-    """A row for each gain: the claims that no longer hold if the gain is halved, and if it is doubled."""
-    rows = []
-    for gain in gains():
-        halved, doubled = (_missed(pairs_of, s.name) for s in GAINS if gain.key in s.changes)
-        rows.append({**gain._asdict(), "halved": halved, "doubled": doubled})
-    return rows
-
-
-def _sensitivity(pairs_of: BySetting) -> Rows:
-    """A row for each setting of ELSEWHERE: the claims that no longer hold, and those that hold in their
-    ablation only there."""
-    return [
-        {
-            "variant": setting.name,
-            "changes": dict(setting.changes),
-            "missed": _missed(pairs_of, setting.name),
-            "also_without": _also_without(pairs_of, setting.name),
-        }
-        for setting in ELSEWHERE
-    ]
-
-
-def _also_without(pairs_of: BySetting, setting: str) -> Rows:
-    """The claims that hold in a setting and in its ablation, but do not hold in the ablation of the published
-    setting."""
-    pairs = zip(MEASURED, pairs_of[setting], pairs_of[AS_PUBLISHED.name], strict=True)
-    return [
-        _claim_row(claim, number_without) | {"without": TAKES[claim.ablation]}
-        for claim, (number, number_without), (_, published_without) in pairs
-        if claim.holds(number) and claim.holds(number_without) and not claim.holds(published_without)
-    ]
-
-
-def _claim_row(claim: Claim, number: float) -> Document:
-    """A claim with its number in a setting, or in the ablation of a setting."""
-    return {
-        "where": claim.where,
-        "statement": claim.statement,
-        "number": finite(number),
-        "unit": claim.measure.unit,
-        "none": claim.measure.none,
-    }
-
-
-def _missed(pairs_of: BySetting, setting: str) -> Rows:
-    """The claims that hold in the published setting but not in this setting, with their numbers there."""
-    pairs = zip(MEASURED, pairs_of[AS_PUBLISHED.name], pairs_of[setting], strict=True)
-    return [
-        _claim_row(claim, number)
-        for claim, (published_number, _), (number, _) in pairs
-        if claim.holds(published_number) and not claim.holds(number)
-    ]
 
 
 FILES: Makers = {

@@ -8,7 +8,8 @@ from beaver_ftc.aircraft import AXES, load
 from beaver_ftc.aircraft.aircraft import MOMENTS
 from beaver_ftc.results.model import Document
 from beaver_ftc.studies.present.tables import number, seconds
-from beaver_ftc.studies.reproduce.cases import CASES, HEALTHY, Flown, fly_case
+from beaver_ftc.studies.reproduce.cases import CASES, HEALTHY, fly_case
+from beaver_ftc.studies.reproduce.flown import Flown
 
 COVERED = {
     "p": 0.05,

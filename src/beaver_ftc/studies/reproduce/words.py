@@ -5,12 +5,12 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from beaver_ftc.documents.document import parse
 from beaver_ftc.results.model import Document
 from beaver_ftc.results.terminal import printed
 from beaver_ftc.studies.present import page, tables
 from beaver_ftc.studies.present.tables import tabulated
 from beaver_ftc.studies.reproduce import beside, truth_and_design
+from beaver_ftc.studies.reproduce.choices import data_of
 from beaver_ftc.studies.reproduce.claims import BORNE_OUT, CANNOT_BE_JUDGED, NOT_BORNE_OUT, STRONGER
 from beaver_ftc.studies.reproduce.published_figures import FIGURES, SENSITIVITY
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 NAME = "reproduction"
 WIDTH = 132
 VERDICT_HEAD = ("Published", "Statement", "Our number", "Limit", "Without", "Verdict", "Remark")
-_SAYS = parse(Path(__file__).with_name("page.yaml").read_text(encoding="utf-8")).data
+_SAYS = data_of("page.yaml")
 ELSEWHERE_TOO = "borne out, elsewhere too"
 DEVIATIONS: list[str] = _SAYS["deviations from the paper"]
 _STYLE = {STRONGER: "green", BORNE_OUT: "green", NOT_BORNE_OUT: "bold red"}
@@ -149,21 +149,21 @@ GAIN_COLUMNS = (
 
 def headline(document: Document) -> str:
     """The verdicts on the statements, in sentences."""
-    tested = document["testable"]
-    built = document["construction"]
-    settings = len(document["sensitivity"])
-    n_hold = built["hold"]
-    count = built["statements"]
-    background = document["background"]
-    holding = f"All {count} hold" if n_hold == count else f"{n_hold} of these {count} hold"
+    n_tested, built = document["testable"]["statements"], document["construction"]
+    all_hold = built["hold"] == built["statements"]
+    holding = "All {statements} hold" if all_hold else "{hold} of these {statements} hold"
     return (
-        f"The paper has {tested['statements'] + count + background} statements. {tested['statements']} of "
-        f"them can be tested: {tested['hold']} hold, {tested['do_not']} do not hold, and "
-        f"{tested['unsettled']} hold even without the mechanism that the paper gives as the reason. "
-        f"{tested['elsewhere']} of the {tested['hold']} also hold in each of {settings} settings that the "
-        f"paper did not fly. {count} other statements follow from the construction of the code. {holding} in "
-        f"our flights, but they show nothing about the scheme. The last {background} statements contain "
-        "nothing that can be measured."
+        "The paper has {total} statements. {testable[statements]} of them can be tested: {testable[hold]} "
+        "hold, {testable[do_not]} do not hold, and {testable[unsettled]} hold even without the mechanism "
+        "that the paper gives as the reason. {testable[elsewhere]} of the {testable[hold]} also hold in each "
+        "of {settings} settings that the paper did not fly. {construction[statements]} other statements "
+        "follow from the construction of the code. {holding} in our flights, but they show nothing about the "
+        "scheme. The last {background} statements contain nothing that can be measured."
+    ).format(
+        total=n_tested + built["statements"] + document["background"],
+        settings=len(document["sensitivity"]),
+        holding=holding.format(**built),
+        **document,
     )
 
 

@@ -14,7 +14,7 @@ from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.log import Columns
 from beaver_ftc.results.metrics import measure
 from beaver_ftc.scenario.undeclared import undeclared
-from beaver_ftc.studies.sensitivity import command, effects, mechanisms
+from beaver_ftc.studies.sensitivity import command, effects, mechanisms, outcomes
 from beaver_ftc.studies.sensitivity.effects import CRITERIA, document_of, net
 from beaver_ftc.studies.sensitivity.mechanisms import (
     CONSTANT,
@@ -64,7 +64,7 @@ def test_both_flights_of_a_pair_have_the_same_healthy_loop(mechanism):
     rows = []
     for scenario, withheld in ((healthy, ""), (without_mechanism(healthy, mechanism), mechanism.withheld)):
         log = Columns(*(f"{surface}_cmd_rad" for surface in healthy.airframe.surfaces))
-        fly(scenario, log, watch=partial(mechanisms.withhold, withheld))
+        fly(scenario, log, watch=partial(outcomes.withhold, withheld))
         rows.append([*log.values()])
     assert np.array_equal(*rows)
 
@@ -75,7 +75,7 @@ def test_both_flights_of_a_pair_have_the_same_healthy_loop(mechanism):
 ])  # fmt: skip
 def test_what_is_withheld_from_the_law_it_does_not_use(withheld, modes):
     log = Columns("t_s", "flap_cmd_rad")
-    flight = fly(scenario_of(ELEVATOR, 7, DEFAULT), log, watch=partial(mechanisms.withhold, withheld))
+    flight = fly(scenario_of(ELEVATOR, 7, DEFAULT), log, watch=partial(outcomes.withhold, withheld))
     found = measure(flight)
     assert found.isolation.correct
     assert [change.mode for change in found.supervisor] == modes
@@ -192,7 +192,7 @@ def test_a_false_alarm_of_a_worst_case_detector_wants_a_reason(few_cells, reason
 
 def test_a_flight_that_failed_is_not_one_without_an_alarm(few_cells):
     rows = rows_of(None)
-    rows[0][DEFAULT] = mechanisms.FAILED
+    rows[0][DEFAULT] = outcomes.FAILED
     of, flown = document_of(1, 1, rows, [])["systems"][DEFAULT], len(rows) - 1
     counts = [of[name][key] for name in ("detected", "lost") for key in ("count", "of")]
     assert (of["flights"], *counts) == (flown, flown, flown, 0, flown)

@@ -17,7 +17,7 @@ from beaver_ftc.results.metrics import measure, versions
 from beaver_ftc.results.model import Document, Metrics
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.engine.statistics import CONFIDENCE, counted, median
-from beaver_ftc.studies.present.tables import grouped
+from beaver_ftc.studies.present.tables import grouped, sum_of, values_of
 from beaver_ftc.studies.sensitivity.errors import Error, changes_of, errors_of
 
 FACTORS = (1.0, 1.5, 2.0, 4.0)  # size of an error over the declared size
@@ -144,10 +144,10 @@ def summary(rows: Sequence[Document]) -> Document:
     """Counts and medians with their intervals, of the completed flights. A number that is None, such as the
     tracking error of a lost aircraft or the delay without a detection, counts as infinite."""
     completed = [row for row in rows if not row["failed"]]
-    counts = {name: sum(row[name] for row in completed) for name in COUNTED}
+    counts = {name: sum_of(completed, name) for name in COUNTED}
     return {
         "flights": len(completed),
         "failed": len(rows) - len(completed),
         **{name: counted(count, len(completed)) for name, count in counts.items()},
-        **{name: median(row[name] for row in completed) for name in MEASURED},
+        **{name: median(values_of(completed, name)) for name in MEASURED},
     }

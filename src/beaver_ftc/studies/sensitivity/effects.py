@@ -11,12 +11,13 @@ from math import isfinite
 from beaver_ftc.results.metrics import versions
 from beaver_ftc.results.model import Document
 from beaver_ftc.studies.engine.statistics import CONFIDENCE, binomial, counted, median, or_never
+from beaver_ftc.studies.present.tables import known_values, sum_of, values_of
 from beaver_ftc.studies.sensitivity.mechanisms import FACTORS, Flight, cases_of
 from beaver_ftc.studies.sensitivity.systems import MECHANISMS, SYSTEMS, Mechanism
 
 LATE_S = 0.1  # an alarm that is later by more than this is late
 WORSE = 1.1  # a tracking error larger by more than this factor is worse
-Outcome = Document  # of a flight, as `outcome_of` of mechanisms.py returns it
+Outcome = Document  # of a flight, as `outcome_of` of outcomes.py returns it
 Rows = Sequence[Mapping[str, Outcome]]  # for each draw, the outcomes by key, as `fly_one` returns them
 Pair = tuple[Outcome, Outcome]  # outcomes (a, b) of a draw: a with the mechanism, b without it
 
@@ -36,7 +37,7 @@ def document_of(seed: int, draws: int, rows: Rows, margins: list[Document]) -> D
         "late_s": LATE_S,
         "worse": WORSE,
         "margins": margins,
-        "systems": {system: _system_row([row[system] for row in rows]) for system in SYSTEMS},
+        "systems": {system: _system_row(values_of(rows, system)) for system in SYSTEMS},
         "mechanisms": [_row_of(mechanism, cases, rows) for mechanism in MECHANISMS],
         "false_alarms": alarms,
         "versions": dict(versions()),
@@ -65,14 +66,14 @@ def _row_of(mechanism: Mechanism, cases: Sequence[Flight], rows: Rows) -> Docume
 def effect_of(pairs: Sequence[Pair]) -> Document:
     """The effect of the mechanism in these pairs: net shares by criterion, and medians with and without it.
     Pairs with a failed flight are left out; those with a false alarm are left out of the delays."""
-    completed = [pair for pair in pairs if not any(outcome["failed"] for outcome in pair)]
+    completed = [pair for pair in pairs if not any(values_of(pair, "failed"))]
     return {
         "flights": len(completed),
         "failed": len(pairs) - len(completed),
         "same_verdict": sum(a["verdict"] == b["verdict"] for a, b in completed),
         "same_tracking": sum(a["tracking_deg_s"] == b["tracking_deg_s"] for a, b in completed),
         **{name: net(completed, is_worse) for name, is_worse in CRITERIA.items()},
-        "delay_s": _both([p for p in completed if not any(o["false_alarm"] for o in p)], "delay_s"),
+        "delay_s": _both([p for p in completed if not any(values_of(p, "false_alarm"))], "delay_s"),
         "tracking_deg_s": _both(completed, "tracking_deg_s"),
         "tracking_ratio": median(_ratio(a, b) for a, b in completed),
     }
@@ -136,15 +137,15 @@ def _system_row(outcomes: Sequence[Outcome]) -> Document:
     """The row of a system with all of its mechanisms, over the completed flights."""
     completed = [o for o in outcomes if not o["failed"]]
     rates = {
-        "false_alarms": sum(o["false_alarm"] for o in completed),
-        "detected": sum(o["delay_s"] is not None for o in completed),
-        "named": sum(o["named"] for o in completed),
+        "false_alarms": sum_of(completed, "false_alarm"),
+        "detected": len(known_values(completed, "delay_s")),
+        "named": sum_of(completed, "named"),
         "lost": sum(o["tracking_deg_s"] is None for o in completed),
     }
     return {
         "flights": len(completed),
         **{name: counted(count, len(completed)) for name, count in rates.items()},
-        "tracking_deg_s": median(o["tracking_deg_s"] for o in completed),
+        "tracking_deg_s": median(values_of(completed, "tracking_deg_s")),
     }
 
 
@@ -164,6 +165,6 @@ def _alarms_of(key: str, rows: Rows) -> Document:
         "count": len(reasons),
         "undeclared": sum(reason["undeclared"] > 0 for reason in reasons),
         "certified": sum(bool(reason["certified"]) for reason in reasons),
-        "certifiable": sum(reason["certified"] is not None for reason in reasons),
+        "certifiable": len(known_values(reasons, "certified")),
         "unexplained": sum(r["undeclared"] == 0 or (worst_case and r["certified"] is False) for r in reasons),
     }

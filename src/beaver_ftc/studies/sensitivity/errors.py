@@ -23,6 +23,7 @@ from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.diagnosis import ActuatorBound
 from beaver_ftc.scenario.schema import Scenario, Sinusoid, TrueInertia
 from beaver_ftc.scenario.sensors import PRESETS, Sensors
+from beaver_ftc.studies.present.tables import values_of
 
 FREQUENCIES_RAD_S = (5.0, 15.0)  # of an unstructured acceleration, if the scenario has none
 UNDECLARED_SHARE = 0.01  # unit of an error of a coefficient or a moment of inertia that is not declared
@@ -160,7 +161,7 @@ def _servos(declared: Declared) -> Error:
             truth[name] = signed(shares, 1.0, FACTOR_LIMITS, times, draws) | {"dead_band_deg": band_deg}
         return {"uncertainty.actuators": truth}
 
-    largest = {key: max(bound[key] for bound in bounds.values()) for key in ActuatorBound.model_fields}
+    largest = {key: max(values_of(bounds.values(), key)) for key in ActuatorBound.model_fields}
     size = "{bandwidth:.0%}, {rate_limit:.0%}, {dead_band_deg:g} deg".format(**largest).replace("%", " %")
     return Error("actuators", size, change)
 

@@ -2,16 +2,13 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from operator import itemgetter
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from beaver_ftc.results.model import Document
 from beaver_ftc.results.style import BLACK
-from beaver_ftc.studies.present.figures import GRID, draw_estimates, label_edges, panels
-from beaver_ftc.studies.present.page import Part, Pictures, study_files, table, versions_line
-from beaver_ftc.studies.present.tables import bare_percent, estimate, grouped, number_or_never
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from beaver_ftc.studies.present.figures import GRID, Figure, draw_estimates, label_edges, panels
+from beaver_ftc.studies.present.page import Page, Pictures, study_files, table, versions_line
+from beaver_ftc.studies.present.tables import bare_percent, estimate, grouped, number_or_never, values_of
 
 NAME = "sensitivity"
 CAPTION = (
@@ -24,7 +21,7 @@ SHOWN = {
 }  # fmt: skip
 
 
-def page_of(document: Document) -> tuple[str, Sequence[Part]]:
+def page_of(document: Document) -> Page:
     """The title and the parts of the page, and of the text without its pictures."""
     return f"Beyond what is declared: {document['scenario']}", [
         *error_sentences(document), table(COLUMNS, document["rows"]), CAPTION,
@@ -92,7 +89,7 @@ COLUMNS = (
 )  # fmt: skip
 
 
-def draw_errors(document: Document) -> "Figure":
+def draw_errors(document: Document) -> Figure:
     """A row of panels for each quantity, a column for each error, over the factor. Bars are intervals; a
     value that is infinite has no point."""
     errors = [*grouped(document["rows"], "error").values()]
@@ -112,7 +109,7 @@ def draw_errors(document: Document) -> "Figure":
         for panel, rows in zip(line, errors, strict=True):
             drawn_rows = [row for row in rows if None not in (row[quantity]["value"], row[quantity]["low"])]
             draw_estimates(
-                panel, [row["factor"] for row in drawn_rows], [row[quantity] for row in drawn_rows], times,
+                panel, values_of(drawn_rows, "factor"), values_of(drawn_rows, quantity), times,
                 color=BLACK, marker="o", markersize=4, linewidth=1.2, capsize=2,
             )  # fmt: skip
             panel.set_xscale("log", base=2)

@@ -1,18 +1,14 @@
 """The effects of the loss of a mechanism: as sentences, tables, a figure and files."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from functools import partial
 from itertools import chain
-from typing import TYPE_CHECKING
 
 from beaver_ftc.results.model import Document
-from beaver_ftc.studies.present.figures import GRID, SERIES, draw_estimates, label_edges, panels
-from beaver_ftc.studies.present.page import Heading, Part, Pictures, Table, study_files, table, versions_line
-from beaver_ftc.studies.present.tables import Columns, bare_percent, estimate, number, number_or_never
+from beaver_ftc.studies.present.figures import GRID, SERIES, Figure, draw_estimates, label_edges, panels
+from beaver_ftc.studies.present.page import Heading, Page, Pictures, Table, study_files, table, versions_line
+from beaver_ftc.studies.present.tables import Columns, bare_percent, estimate, number, number_or_never, sum_of
 from beaver_ftc.studies.sensitivity.systems import DEFAULT, MECHANISMS, PAPER, SYSTEMS
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 NAME = "sensitivity"
 CRITERION_WORDS = {  # by criterion of effects.py
@@ -39,7 +35,7 @@ _FACTOR_WORDS = {
 }  # fmt: skip
 
 
-def page_of(document: Document) -> tuple[str, Sequence[Part]]:
+def page_of(document: Document) -> Page:
     """The title and the parts of the page, and of the text without its pictures."""
     table_of = tables(document)
     return "What each mechanism is worth", [
@@ -56,7 +52,7 @@ def mechanism_sentences(document: Document) -> Iterator[str]:
     yield from (mechanism_sentence(row) for row in document["mechanisms"])
     alarms = [row for row in document["false_alarms"] if row["worst_case"]]
     total, without, certified, certifiable = (
-        sum(row[key] for row in alarms) for key in ("count", "unexplained", "certified", "certifiable")
+        sum_of(alarms, key) for key in ("count", "unexplained", "certified", "certifiable")
     )
     yield (
         f"In all of these flights, worst-case detectors raise {total} false alarms. The reason of "
@@ -168,7 +164,7 @@ MARGINS = (
 )  # fmt: skip
 
 
-def draw_mechanisms(document: Document) -> "Figure":
+def draw_mechanisms(document: Document) -> Figure:
     """A panel for each criterion, a dot with its interval for each mechanism. To the right of 0, the
     mechanism helps."""
     rows = document["mechanisms"]

@@ -117,7 +117,8 @@ def _compare(
     """Write the comparison of several flights, and print it. Returns the document of `recommended_for`.
     results: of `_split`."""
     from beaver_ftc.studies.mismatch.bound import recommended_for
-    from beaver_ftc.studies.mismatch.study import entry, write_comparison
+    from beaver_ftc.studies.mismatch.documents import entry
+    from beaver_ftc.studies.mismatch.study import write_comparison
     from beaver_ftc.studies.mismatch.tables import comparison_text
 
     entries = [entry(document) for document, _ in results]
@@ -130,7 +131,7 @@ def _compare(
 def _map(scenario: "Scenario", out: Path, report: bool, show: Show) -> list[Document]:
     """The map of the model error over airspeed and altitude; prints the path of its folder."""
     from beaver_ftc.studies.engine.study import run_into
-    from beaver_ftc.studies.mismatch.study import map_study
+    from beaver_ftc.studies.mismatch.over_envelope import map_study
 
     with progress_bar(f"{scenario.name}: envelope") as progress:
         document = run_into(map_study(scenario, report), out, progress=progress)

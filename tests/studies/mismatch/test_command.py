@@ -10,7 +10,7 @@ import pytest
 import commands
 from beaver_ftc.results.log import StoredLog
 from beaver_ftc.studies.engine.study import run_into
-from beaver_ftc.studies.mismatch import study
+from beaver_ftc.studies.mismatch import over_envelope
 from beaver_ftc.studies.mismatch.sources import SOURCES
 from beaver_ftc.studies.mismatch.variants import VARIANTS, variant_of
 from flying import loss, scenario
@@ -146,10 +146,10 @@ def test_every_named_variant_is_a_valid_scenario_that_differs_in_its_design_mode
 
 
 def test_the_map_covers_the_envelope_and_names_the_reason(monkeypatch, tmp_path):
-    monkeypatch.setattr(study, "AIRSPEEDS_MPS", (40.0, 50.0))
-    monkeypatch.setattr(study, "ALTITUDES_M", (500.0, 2500.0))
+    monkeypatch.setattr(over_envelope, "AIRSPEEDS_MPS", (40.0, 50.0))
+    monkeypatch.setattr(over_envelope, "ALTITUDES_M", (500.0, 2500.0))
     case = scenario(duration_s=2, faults=[loss(at_s=1)], design_model={"engine_terms": False})
-    found = run_into(study.map_study(case), tmp_path)
+    found = run_into(over_envelope.map_study(case), tmp_path)
     entries = found["map"]
     assert len(entries) == 2 * 2 * 3
     slow, fast = (

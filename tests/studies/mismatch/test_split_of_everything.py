@@ -2,7 +2,7 @@
 
 import pytest
 
-from beaver_ftc.studies.mismatch import study
+from beaver_ftc.studies.mismatch import documents
 from beaver_ftc.studies.mismatch.split import UNEXPLAINED, split_flight
 from flying import loss, scenario
 
@@ -35,7 +35,7 @@ def case():
 
 def test_what_each_source_adds(case, changed):
     """But for what rounding leaves, which is no number to hold."""
-    document = study.document(case, *split_flight(case))
+    document = documents.document(case, *split_flight(case))
     assert 0.0 < document.pop("closure") < 1e-9
     assert all(axis.pop(UNEXPLAINED)["max"] < 1e-9 for axis in document["axes"].values())
     assert not changed(document)

@@ -16,7 +16,7 @@ from beaver_ftc.plant.channels import log_columns
 from beaver_ftc.results.log import unit_of
 from beaver_ftc.studies.detectability import levels, places
 from beaver_ftc.studies.detectability.grid import WITHIN_S
-from beaver_ftc.studies.mismatch import split, study
+from beaver_ftc.studies.mismatch import documents, split
 from beaver_ftc.studies.mismatch.sources import SOURCES
 from beaver_ftc.studies.present.tables import markdown_table
 from beaver_ftc.studies.sweep.columns import columns_of
@@ -45,7 +45,7 @@ Columns = Mapping[str, str]  # name -> type
 # Columns that are no numbers.
 _OTHERS = {
     **dict.fromkeys(("sensors", "turbulence", "surface", "scheme", "fault", "confused_with", "other", "why",
-                     "named", *study.PLACE), TEXT),
+                     "named", *documents.PLACE), TEXT),
     **dict.fromkeys(("false_alarm", "own_false_alarm", "faulty"), FLAG), "seed": "count",
 }  # fmt: skip
 
@@ -59,7 +59,7 @@ def tables() -> dict[str, Columns]:
     names = {
         "detectability-grid": levels.COLUMNS,
         "detectability": (*places.POINT_COLUMNS, *places.PAIR_COLUMNS),
-        "mismatch": (*study.PLACE, *study.FIGURES),
+        "mismatch": (*documents.PLACE, *documents.FIGURES),
         "mismatch-frames": split.COLUMNS,
         "diagnosis": rows.table(["SURFACE"], with_probability=True),
     }

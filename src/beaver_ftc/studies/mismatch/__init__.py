@@ -6,7 +6,9 @@ sources    the part of each cause in truth less design, from differences of mode
 split      the sum of the causes, compared with the bound
 bound      the bound that is recommended
 linear     truth and design linearised about the trim
+documents  the document of a split, rows and entries
 study      flights and their files
+over_envelope     the map over airspeed and altitude
 variants   scenarios with wrong designs
-tables, charts    the results for people
+tables, charts, linear_charts    the results for people
 """

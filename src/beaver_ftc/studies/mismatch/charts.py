@@ -1,11 +1,11 @@
-"""The mismatch as pictures: sources in time, sources against the bound, the linear models side by side.
+"""The mismatch as pictures: sources in time, against the bound, of several flights, and over the envelope.
 
 Colour-blind readers can distinguish the colours; dashes and order distinguish the curves in grey.
 """
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -13,21 +13,14 @@ from beaver_ftc.aircraft import AXES
 from beaver_ftc.documents.files import Document
 from beaver_ftc.results.expectations import MOTION_OF_AXIS, without_underscores
 from beaver_ftc.results.log import StoredLog
-from beaver_ftc.results.model import Metrics
 from beaver_ftc.results.series import series_of
-from beaver_ftc.results.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION, Mark, marks
-from beaver_ftc.studies.linear_systems import CHANNELS, response
-from beaver_ftc.studies.mismatch.linear import LinearAnalysis
+from beaver_ftc.results.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION, Mark
+from beaver_ftc.studies.mismatch.linear_charts import dress
 from beaver_ftc.studies.mismatch.sources import SOURCES
 from beaver_ftc.studies.mismatch.split import CAUSES, ETA_BAR, FAULT, TOTAL, UNEXPLAINED, column
 from beaver_ftc.studies.mismatch.tables import share_text
-from beaver_ftc.studies.present.figures import heat_map, label_edges, panels
-from beaver_ftc.studies.present.page import Files
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
+from beaver_ftc.studies.present.figures import Axes, Figure, heat_map, label_edges, panels
+from beaver_ftc.studies.present.tables import values_of
 
 AXIS_NAMES = [f"{motion} {axis}" for axis, motion in MOTION_OF_AXIS.items()]
 LONGEST_BAR = 1e6  # length of a share of a bound that is zero
@@ -42,23 +35,9 @@ SOURCE_LOOKS: dict[str, tuple[str, tuple[float, ...]]] = {
     "inertia_coupling": (GREEN, (2, 2)), "sinusoids": (BLUE, ()), "wind_turbulence": (SKY, ()),
     "earth_rotation": (ORANGE, (1, 1)), "integration": (ORANGE, (6, 2)),
 }  # fmt: skip
-MODEL_LOOKS: dict[str, tuple[str, dict[str, Any]]] = {  # marker of a pole, and curve
-    "truth": ("o", {"color": BLACK, "linewidth": 2.6, "alpha": 0.45, "label": "truth (JSBSim)"}),
-    "fdc": ("+", {"color": BLUE, "linewidth": 1.3, "dashes": (5, 2), "label": "FDC equations"}),
-    "design": ("x", {"color": VERMILION, "linewidth": 1.3, "dashes": (1.5, 1.5), "label": "design model"}),
-}
 
 
-def figures(folder: Path, document: Document, metrics: Metrics, analysis: LinearAnalysis) -> Files:
-    """The figures of a result folder that holds `mismatch.parquet`, by the name of their files."""
-    return {
-        "mismatch-sources.png": sources_figure(folder / "mismatch.parquet", document, marks(metrics)),
-        "mismatch-bound.png": bound_figure(document),
-        "mismatch-linear.png": linear_figure(analysis, document["scenario"]),
-    }
-
-
-def sources_figure(frames: Path, document: Document, instants: Sequence[Mark]) -> "Figure":
+def sources_figure(frames: Path, document: Document, instants: Sequence[Mark]) -> Figure:
     """A panel for each axis: the largest sources, and the sum of all without the fault, in front of the
     bound."""
     chosen = {axis: largest_sources(document, axis) for axis in AXES}
@@ -81,7 +60,7 @@ def largest_sources(document: Document, axis: str) -> list[str]:
     return [name for name in by_peak[:SHOWN_SOURCES] if peaks[name] >= least]
 
 
-def _draw_sources(axes: "Axes", series: dict, axis: str, chosen: list[str], instants: Sequence[Mark]) -> None:
+def _draw_sources(axes: Axes, series: dict, axis: str, chosen: list[str], instants: Sequence[Mark]) -> None:
     """The bound, the sum, the chosen sources and the event marks of one axis."""
     t = series["t_s"]
     bound = series[column(axis, ETA_BAR)]
@@ -98,18 +77,11 @@ def _draw_sources(axes: "Axes", series: dict, axis: str, chosen: list[str], inst
             mark.letter, (mark.time_s, 1.0), xycoords=("data", "axes fraction"), textcoords="offset points",
             xytext=(0, 2 + 9 * (i % 2)), fontsize=8,  # neighbours at two heights
         )  # fmt: skip
-    _dress(axes)
+    dress(axes)
     axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8, frameon=False)
 
 
-def _dress(axes: "Axes") -> None:
-    """The look that all panels with curves share."""
-    axes.tick_params(labelsize=8)
-    axes.grid(color=GREY, alpha=0.3, linewidth=0.5)
-    axes.margins(x=0.01)
-
-
-def bound_figure(document: Document) -> "Figure":
+def bound_figure(document: Document) -> Figure:
     """Bars of the largest share of the bound that each source above LEAST_SHARE has used, a panel for each
     axis."""
     sources_of_axes = [document["axes"][axis] for axis in AXES]
@@ -135,9 +107,9 @@ def _bar_length(share: float | None) -> float:
     return LONGEST_BAR if share is None else share
 
 
-def comparison_figure(entries: Sequence[Document]) -> "Figure":
+def comparison_figure(entries: Sequence[Document]) -> Figure:
     """Bars of the largest mismatch over the bound in each flight, a panel for each axis."""
-    needed = [[entry[f"{axis}_worst_ratio"] for entry in entries] for axis in AXES]
+    needed = [values_of(entries, f"{axis}_worst_ratio") for axis in AXES]
     ratios = np.array([[max(_bar_length(ratio), LEAST_RATIO) for ratio in row] for row in needed])
     notes = [
         [
@@ -149,13 +121,13 @@ def comparison_figure(entries: Sequence[Document]) -> "Figure":
     title = "Mismatch at its worst, faults aside, over the bound", "largest mismatch / eta_bar"
     size = 12.0, 1.6 + 0.38 * max(len(entries), 2)
     ends = min(0.1, 0.5 * ratios.min()), 60.0 * max(ratios.max(), 1.0)
-    return _bars(size, title, [entry["scenario"] for entry in entries], ratios, notes, ends)
+    return _bars(size, title, values_of(entries, "scenario"), ratios, notes, ends)
 
 
 def _bars(
     size: tuple[float, float], titles: tuple[str, str], names: Sequence[str], values: np.ndarray,
     notes: list[list[str]], ends: tuple[float, float], grey: str = "",
-) -> "Figure":  # fmt: skip
+) -> Figure:  # fmt: skip
     """Horizontal bars on a logarithmic scale, a panel for each axis; a bar above 1 is red.
 
     titles: above and below the panels. values (axes, names): lengths. notes: text beside each bar. ends: of
@@ -169,8 +141,7 @@ def _bars(
         for place, (value, text) in enumerate(zip(lengths, texts, strict=True)):
             axes.annotate(f" {text}", (value, place), va="center", fontsize=7.5)
         axes.axvline(1.0, color=BLACK, linewidth=1.0, dashes=(4, 2))
-        axes.set_xscale("log")
-        axes.set_xlim(*ends)
+        axes.set(xscale="log", xlim=ends)
         axes.tick_params(labelsize=8)
         axes.grid(axis="x", color=GREY, alpha=0.3, linewidth=0.5)
     grid[0, 0].set_yticks(range(len(names)), names, fontsize=9)
@@ -179,48 +150,7 @@ def _bars(
     return figure
 
 
-def linear_figure(analysis: LinearAnalysis, name: str) -> "Figure":
-    """The poles of all models, and the frequency responses from each surface to its rate."""
-    at = f"{analysis.point.airspeed_mps:g} m/s and {analysis.point.altitude_m:g} m"
-    title = f"Linear models at trim, {at}\n{name}"
-    figure, grid = panels(2, 4, 14.0, 6.4, title, width_ratios=[1.4, 1, 1, 1])
-    for axes in grid[:, 0]:
-        _draw_poles(axes, analysis)
-    grid[1, 0].set(xlim=(-0.12, 0.06), ylim=(-0.5, 0.5))
-    for (surface, rate), magnitude, phase in zip(CHANNELS, *grid[:, 1:], strict=True):
-        _draw_bode(magnitude, phase, analysis, surface, rate)
-    titles = "all poles; below, near the origin", *(f"{surface} to {rate}" for surface, rate in CHANNELS)
-    label_edges(grid, "frequency (rad/s)", ["imaginary part (rad/s)"] * 2, titles)
-    grid[1, 0].set_xlabel("real part (1/s)", fontsize=9)
-    grid[0, 1].set_ylabel("magnitude (dB, rad/s per rad)", fontsize=9)
-    grid[1, 1].set_ylabel("phase (deg)", fontsize=9)
-    entries = grid[0, 1].get_legend_handles_labels()
-    figure.legend(*entries, loc="outside lower center", ncols=len(MODEL_LOOKS), fontsize=9, frameon=False)
-    return figure
-
-
-def _draw_poles(axes: "Axes", analysis: LinearAnalysis) -> None:
-    """The poles of each model in the complex plane."""
-    for model, (mark, look) in MODEL_LOOKS.items():
-        poles = np.linalg.eigvals(analysis.models[model].A)
-        style = {"color": look["color"], "label": look["label"], "alpha": look.get("alpha", 1.0)}
-        axes.scatter(poles.real, poles.imag, s=70, marker=mark, **style)
-    axes.axvline(0.0, color=GREY, linewidth=0.8)
-    _dress(axes)
-
-
-def _draw_bode(magnitude: "Axes", phase: "Axes", analysis: LinearAnalysis, surface: str, rate: str) -> None:
-    """Magnitude (dB) and phase (deg) from a surface to a rate, over the frequency w in rad/s."""
-    w = np.geomspace(0.01, 50.0, 300)
-    for model, (_, look) in MODEL_LOOKS.items():
-        H = response(*analysis.channel(model, surface, rate), w)
-        magnitude.semilogx(w, 20.0 * np.log10(np.abs(H)), **look)
-        phase.semilogx(w, np.degrees(np.unwrap(np.angle(H))), **look)
-    for axes in (magnitude, phase):
-        _dress(axes)
-
-
-def map_figure(entries: Sequence[Document], name: str) -> "Figure":
+def map_figure(entries: Sequence[Document], name: str) -> Figure:
     """The largest mismatch over the bound against airspeed and altitude, a panel for each axis; hatched
     without a trim.
 
@@ -228,7 +158,7 @@ def map_figure(entries: Sequence[Document], name: str) -> "Figure":
     """
     from matplotlib.colors import LogNorm
 
-    speeds, altitudes = (list(dict.fromkeys(e[of] for e in entries)) for of in ("airspeed_mps", "altitude_m"))
+    speeds, altitudes = (list(dict.fromkeys(values_of(entries, of))) for of in ("airspeed_mps", "altitude_m"))
     worst = [np.nan if entry["worst_ratio"] is None else entry["worst_ratio"] for entry in entries]
     grids = np.moveaxis(np.reshape(worst, (len(altitudes), len(speeds), len(AXES))), -1, 0)
     positive = grids[grids > 0.0] if (grids > 0.0).any() else np.ones(1)

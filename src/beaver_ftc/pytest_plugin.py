@@ -189,14 +189,14 @@ class SweepFile(FlownFile):
 
     def _read(self) -> tuple[str, list[str]]:
         from beaver_ftc.scenario.sweeps import load_sweep
-        from beaver_ftc.studies.sweep.summary import names
+        from beaver_ftc.studies.sweep.expectations import names
 
         self.sweep = load_sweep(self.path)
         return self.sweep.name, names(self.sweep.file.expect)
 
     def _fly(self, out: Path) -> Flown:
         from beaver_ftc.studies.sweep.campaign import Options, run_sweep
-        from beaver_ftc.studies.sweep.summary_page import verdict
+        from beaver_ftc.studies.sweep.summary_words import verdict
 
         summary = run_sweep(self.sweep, Options(out, report=False, source=str(self.path)))
         if not summary["passed"]:

@@ -160,7 +160,7 @@ def _fly(sweep: "Sweep", options: "Options", format: Format) -> "Judged":
     """Fly a sweep, print its summary, and return its verdict."""
     from beaver_ftc.cli.progress import sweep_progress
     from beaver_ftc.studies.sweep.campaign import named_for, run_sweep
-    from beaver_ftc.studies.sweep.summary_page import summary_text, verdict
+    from beaver_ftc.studies.sweep.summary_words import summary_text, verdict
 
     with _stoppable() as stopped, sweep_progress(sweep.name) as progress:
         document = run_sweep(sweep, options, progress, stopped)

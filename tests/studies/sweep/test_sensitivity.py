@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.studies.sweep.pictures import in_words
+from beaver_ftc.studies.sweep.key_words import in_words
 from beaver_ftc.studies.sweep.ranking import rank
 
 

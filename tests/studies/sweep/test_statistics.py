@@ -3,8 +3,9 @@
 import pytest
 
 from beaver_ftc.scenario.sweeps import SweepExpect, load_sweep_text
-from beaver_ftc.studies.sweep.summary import evaluate, summarise
-from beaver_ftc.studies.sweep.summary_page import exact_percent, summary_text
+from beaver_ftc.studies.sweep.expectations import evaluate
+from beaver_ftc.studies.sweep.summary import summarise
+from beaver_ftc.studies.sweep.summary_words import exact_percent, summary_text
 
 from .counted import ROWS, SWEEP, detected, flights_of, row
 

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 from beaver_ftc.public import lazily
 
 if TYPE_CHECKING:
+    from beaver_ftc.studies.sweep.expectations import evaluate as evaluate_summary
     from beaver_ftc.studies.sweep.one_flight import (
         BAD_INPUT,
         CRASHED,
@@ -22,6 +23,5 @@ if TYPE_CHECKING:
     from beaver_ftc.studies.sweep.outcomes import Flights
     from beaver_ftc.studies.sweep.sampling import Assignment, Plan
     from beaver_ftc.studies.sweep.store import write_tables
-    from beaver_ftc.studies.sweep.summary import evaluate as evaluate_summary
 else:
     __getattr__, __dir__ = lazily(__name__)

@@ -19,6 +19,7 @@ from beaver_ftc.studies.engine.flying import Flying
 from beaver_ftc.studies.engine.processes import cores
 from beaver_ftc.studies.engine.store import batches_of
 from beaver_ftc.studies.engine.workers import LocalWorkers, Number, Work, Workers
+from beaver_ftc.studies.present.tables import values_of
 from beaver_ftc.studies.sweep import one_flight
 from beaver_ftc.studies.sweep.one_flight import Keep, counts_of
 from beaver_ftc.studies.sweep.sampling import Assignment, Plan, Round
@@ -178,7 +179,8 @@ def conclude(sweep: Sweep, options: Options, store: Store) -> Document:
 
 def _summary(sweep: Sweep, options: Options, flights: "Flights", results: Path) -> Document:
     """The content of `summary.json`."""
-    from beaver_ftc.studies.sweep.summary import evaluate, summarise
+    from beaver_ftc.studies.sweep.expectations import evaluate
+    from beaver_ftc.studies.sweep.summary import summarise
     from beaver_ftc.studies.sweep.worst import replay_command, worst_flights
 
     command = replay_command(options.source, options.out, options.search)
@@ -188,7 +190,7 @@ def _summary(sweep: Sweep, options: Options, flights: "Flights", results: Path) 
         **({"search": search_result(options.search, results, sweep)} if options.search else {}),
         "worst": worst_flights(flights, sweep, command),
         "expectations": expectations,
-        "passed": all(expectation["passed"] for expectation in expectations),
+        "passed": all(values_of(expectations, "passed")),
         "versions": dict(versions()),
     }
 

@@ -106,6 +106,12 @@ class Flights:
         pairs = zip(kinds, actuators, strict=True)
         return np.array([_label(kind, actuator, several) for kind, actuator in pairs], dtype=object)
 
+    @cached_property
+    def by_fault(self) -> dict[str, np.ndarray]:
+        """By label of each fault that strikes a faulted flight, the flights that have it."""
+        labels = self.fault_labels
+        return {label: labels == label for label in sorted(set(labels[self.faulted]))}
+
     def is_number(self, key: str) -> bool:
         """Whether a varied key is a number, not a choice of names."""
         return kind_of(self.vary[key]) == "float"

@@ -4,10 +4,8 @@ Each function of FIGURES draws a figure from flights and summary. It returns Non
 the figure.
 """
 
-import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,6 +14,8 @@ from beaver_ftc.results.style import BLACK, BLUE, GREY
 from beaver_ftc.studies.engine.statistics import wilson
 from beaver_ftc.studies.present.figures import (
     GRID,
+    Axes,
+    Figure,
     curve_look,
     draw_estimates,
     heat_map,
@@ -24,15 +24,12 @@ from beaver_ftc.studies.present.figures import (
     panels,
 )
 from beaver_ftc.studies.present.page import save
+from beaver_ftc.studies.present.tables import values_of
+from beaver_ftc.studies.sweep.key_words import in_words
 from beaver_ftc.studies.sweep.outcomes import Flights
 from beaver_ftc.studies.sweep.summary import OUTCOMES
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-
-Drawer = Callable[[Flights, Document], "Figure | None"]
+Drawer = Callable[[Flights, Document], Figure | None]
 Place = tuple[int, ...]  # row and column of a cell
 
 BINS = 16  # most bins of a curve
@@ -42,13 +39,6 @@ _SEARCHED = {  # label of the score, by objective of the search
     "false_alarm": "residual / threshold without a fault",
     "tracking": "RMS tracking error after the fault (deg/s)",
 }
-_UNITS = {
-    "per_h": "1/h", "per_s": "1/s", "per_s2": "1/s2", "rad_s2": "rad/s2", "rad_s": "rad/s", "deg_s": "deg/s",
-    "deg_h": "deg/h", "mps2": "m/s2", "mps": "m/s", "inhg_s": "inHg/s", "inhg": "inHg", "deg": "deg",
-    "rad": "rad", "hz": "Hz", "rpm": "rpm", "pa": "Pa", "db": "dB", "m": "m", "s": "s",
-}  # fmt: skip
-"""The unit of a key, by the ending of its name or of its section."""
-_ENDING = re.compile(rf"_({'|'.join(_UNITS)})(?=\.|$)")
 
 
 def write_figures(flights: Flights, summary: Document, folder: Path) -> list[Path]:
@@ -62,7 +52,7 @@ def write_figures(flights: Flights, summary: Document, folder: Path) -> list[Pat
 
 def _axes(
     title: str, x: str = "", y: str = "", size: tuple[float, float] = (8.0, 4.6)
-) -> tuple["Figure", "Axes"]:
+) -> tuple[Figure, Axes]:
     """A figure with one panel: title, labels of its axes, size in inches."""
     figure, grid = panels(1, 1, *size)
     axes = grid[0, 0]
@@ -74,15 +64,7 @@ def _axes(
     return figure, axes
 
 
-def in_words(key: str) -> str:
-    """A varied key in words: `fault 1: at (s)` of `faults[0].at_s`."""
-    text = re.sub(r"faults\[(\d+)\]", lambda match: f"fault {int(match[1]) + 1}", key)
-    unit = _ENDING.search(text)
-    name = _ENDING.sub("", text).replace(".", ": ").replace("_", " ")
-    return f"{name} ({_UNITS[unit[1]]})" if unit else name
-
-
-def _log_of_numbers(axes: "Axes") -> None:
+def _log_of_numbers(axes: Axes) -> None:
     """A logarithmic axis whose ticks are plain numbers."""
     axes.set_xscale("log")
     axes.xaxis.set_major_formatter("{x:g}")
@@ -92,19 +74,20 @@ def magnitude_key(flights: Flights, summary: Document) -> str | None:
     """The varied key that stands for the size of the fault: the number of a fault other than its times, else
     any number, that explains the detection delay best; the first one without a ranking. None if no number
     varies."""
-    ranked = [entry["key"] for entry in summary["sensitivity"]["detection_delay"]]
+    ranked = values_of(summary["sensitivity"]["detection_delay"], "key")
     numbers = [key for key in (ranked or flights.vary) if flights.is_number(key)]
     of_faults = [key for key in numbers if key.startswith("faults[") and not key.endswith(("at_s", "end_s"))]
     return next(iter(of_faults or numbers), None)
 
 
-def detection_probability(flights: Flights, summary: Document) -> "Figure | None":
+def detection_probability(flights: Flights, summary: Document) -> Figure | None:
     """Share detected over the size of the fault, a curve for each fault, with Wilson intervals."""
     key = magnitude_key(flights, summary)
     if key is None or not flights.faulted.any():
         return None
     figure, axes = _axes("Detection probability (bars: 95 % intervals)", in_words(key), "share detected")
-    for place, (label, group) in enumerate(_faults(flights)):
+    for place, (label, has_fault) in enumerate(flights.by_fault.items()):
+        group = flights.faulted & has_fault
         values = flights[key][group]
         hits = flights.detected[group]
         bins = _levels(values) if flights.vary[key].count else _bins(values)
@@ -118,12 +101,6 @@ def detection_probability(flights: Flights, summary: Document) -> "Figure | None
     axes.set_ylim(-0.03, 1.03)
     axes.legend(fontsize=8)
     return figure
-
-
-def _faults(flights: Flights) -> list[tuple[str, np.ndarray]]:
-    """(label, mask of its faulted flights) of each fault."""
-    labels = flights.fault_labels
-    return [(label, flights.faulted & (labels == label)) for label in sorted(set(labels[flights.faulted]))]
 
 
 def _levels(values: np.ndarray) -> list[np.ndarray]:
@@ -141,14 +118,15 @@ def _bins(values: np.ndarray) -> list[np.ndarray]:
     return np.array_split(np.argsort(values, kind="stable"), count)
 
 
-def delay_distribution(flights: Flights, summary: Document) -> "Figure | None":
+def delay_distribution(flights: Flights, summary: Document) -> Figure | None:
     """Share of faults detected within a time, a curve for each fault that is ever detected. The distance of
     its end from 1 is the share of missed faults."""
     if not flights.detected.any():
         return None
     figure, axes = _axes("", "detection delay (s)", "share of faults detected within the delay")
     axes.set_title("Detection delay", fontsize=10, loc="left")
-    for place, (label, group) in enumerate(_faults(flights)):
+    for place, (label, has_fault) in enumerate(flights.by_fault.items()):
+        group = flights.faulted & has_fault
         delays = np.sort(flights.detection_delay_s[group & flights.detected])
         if delays.size:
             shares = np.arange(1, delays.size + 1) / group.sum()
@@ -166,7 +144,7 @@ def delay_distribution(flights: Flights, summary: Document) -> "Figure | None":
     return figure
 
 
-def confusion_matrix(flights: Flights, summary: Document) -> "Figure | None":
+def confusion_matrix(flights: Flights, summary: Document) -> Figure | None:
     """The numbers of flights by true fault and diagnosis."""
     confusion = summary["confusion"]
     counts, rows, columns = np.array(confusion["counts"]), confusion["faults"], confusion["diagnoses"]
@@ -183,7 +161,7 @@ def confusion_matrix(flights: Flights, summary: Document) -> "Figure | None":
 
 def _shaded(
     title: str, shares: np.ndarray, text: Callable[[Place], str], columns: Sequence[str], rows: Sequence[str]
-) -> "Figure":
+) -> Figure:
     """A heat map of shares (rows, columns) with a text on each cell."""
     figure, axes = _axes(title, size=(max(7.0, 2.6 + 1.15 * len(columns)), 1.7 + 0.55 * len(rows)))
     axes.grid(visible=False)
@@ -192,20 +170,20 @@ def _shaded(
     return figure
 
 
-def sensitivity(flights: Flights, summary: Document) -> "Figure | None":
+def sensitivity(flights: Flights, summary: Document) -> Figure | None:
     """The share of each outcome that the keys explain: the first 12 of the ranking of the first outcome."""
     rankings = {name: ranking for name, ranking in summary["sensitivity"].items() if ranking}
     if not rankings:
         return None
-    keys = [entry["key"] for entry in next(iter(rankings.values()))][:12]
+    keys = values_of(next(iter(rankings.values())), "key")[:12]
     explained = [{entry["key"]: entry["explained"] for entry in ranking} for ranking in rankings.values()]
-    shares = np.array([[share_of[key] for share_of in explained] for key in keys])
+    shares = np.array([values_of(explained, key) for key in keys])
     title = "Sensitivity: share of the ranks of an outcome that a key explains"
     outcomes = [OUTCOMES[name] for name in rankings]
     return _shaded(title, shares, lambda at: f"{shares[at]:.2f}", outcomes, list(map(in_words, keys)))
 
 
-def search_history(flights: Flights, summary: Document) -> "Figure | None":
+def search_history(flights: Flights, summary: Document) -> Figure | None:
     """The worst score so far after each generation of a search."""
     if "search" not in summary:
         return None

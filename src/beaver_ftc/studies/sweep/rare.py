@@ -25,7 +25,7 @@ from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.sweeps import Sweep
 from beaver_ftc.studies.engine.statistics import CONFIDENCE
 from beaver_ftc.studies.engine.study import FlyRound, Study
-from beaver_ftc.studies.present.tables import all_finite, number
+from beaver_ftc.studies.present.tables import all_finite, number, values_of
 from beaver_ftc.studies.sweep.one_flight import scenario_of, warm_up
 from beaver_ftc.studies.sweep.sampling import MAX_U, Assignment, values_at
 from beaver_ftc.studies.sweep.store import identity_of
@@ -127,7 +127,7 @@ class Event:
         def fly(points: np.ndarray) -> Scores:
             """Fly the points of a round; return their scores."""
             rows = fly_round([(chains.flights + i, point.tolist()) for i, point in enumerate(points)])
-            scores = np.array([row["score"] for row in rows])
+            scores = np.array(values_of(rows, "score"))
             if not chains.flights and np.isneginf(scores).all():
                 raise SimulationFailed(f"{self.sweep.name}: no flight could be flown")
             tell(f"{self.name}: {chains.flights + len(rows)} flights, level {chains.levels}")
@@ -183,7 +183,7 @@ def as_text(document: Document) -> str:
     p = document["probability"]
     text = f"not known: {document['why']}" if p is None else f"{p:.2g}"
     lines = [
-        f"{document['sweep']}: {document['expectation']} not met",
+        "{sweep}: {expectation} not met".format(**document),
         f"  probability  {text}, {_interval(document)}, {document['flights']} flights",
         f"  plain        {plain['events']} of {plain['of']} flights, {_interval(plain)}",
     ]
@@ -200,4 +200,4 @@ def as_text(document: Document) -> str:
 
 def _interval(values: Document) -> str:
     """The interval of a probability."""
-    return f"95 % {values['low']:.2g} to {values['high']:.2g}"
+    return "95 % {low:.2g} to {high:.2g}".format(**values)

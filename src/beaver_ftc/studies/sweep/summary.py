@@ -1,4 +1,4 @@
-"""The summary of a sweep: the document `summary.json`, and the evaluation of its expectations.
+"""The statistics of a sweep for the document `summary.json`.
 
 A rate has its count, the number of flights `of` which it is a rate, and its 95 % interval. A number that the
 flights do not give is null. Arrays are columns of the flights (flights,), groups are masks of the same shape.
@@ -7,8 +7,6 @@ flights do not give is null. Arrays are columns of the flights (flights,), group
 import math
 import re
 from collections import Counter
-from collections.abc import Callable, Iterator
-from functools import partial
 
 import numpy as np
 
@@ -17,9 +15,8 @@ from beaver_ftc.results.hints import NEAR_THRESHOLD_SHARE
 from beaver_ftc.results.judgement import is_late
 from beaver_ftc.results.model import Document
 from beaver_ftc.scenario.faults import UNANTICIPATED
-from beaver_ftc.scenario.sweeps import AxisLevels, Level, QuantileLevel, Sweep, SweepExpect
-from beaver_ftc.studies.engine import statistics
-from beaver_ftc.studies.engine.statistics import CONFIDENCE, Estimate, quantile, wilson
+from beaver_ftc.scenario.sweeps import Sweep
+from beaver_ftc.studies.engine.statistics import CONFIDENCE, Estimate, poisson, quantile, wilson
 from beaver_ftc.studies.sweep.outcomes import NO_FAULT, Flights
 from beaver_ftc.studies.sweep.ranking import Ranking, rank
 
@@ -68,11 +65,11 @@ def number(value: float) -> float | None:
 
 def rate(hits: np.ndarray, group: np.ndarray) -> Document:
     """The rate of hits in a group, with Wilson's interval."""
-    count, trials = _counts(hits, group)
+    count, trials = counts(hits, group)
     return {"count": count, "of": trials, **_estimate("rate", wilson(count, trials))}
 
 
-def _counts(hits: np.ndarray, group: np.ndarray) -> tuple[int, int]:
+def counts(hits: np.ndarray, group: np.ndarray) -> tuple[int, int]:
     """Number of hits in a group, and of flights in it."""
     return int((hits & group).sum()), int(group.sum())
 
@@ -86,11 +83,11 @@ def _estimate(name: str, estimate: Estimate) -> Document:
 def quantiles(values: np.ndarray) -> Document:
     """QUANTILES of the values (n,) without NaN, and their number. An event that never came has an infinite
     value; an infinite quantile is null."""
-    ordered = _sorted_without_nan(values)
+    ordered = sorted_without_nan(values)
     return {"of": ordered.size, **{name: number(quantile(ordered, q)) for name, q in QUANTILES.items()}}
 
 
-def _sorted_without_nan(values: np.ndarray) -> np.ndarray:
+def sorted_without_nan(values: np.ndarray) -> np.ndarray:
     """The values without NaN, sorted."""
     return np.sort(values[~np.isnan(values)])
 
@@ -101,12 +98,9 @@ def _reasons(flights: Flights) -> list[Document]:
     failed = np.flatnonzero(~flights.measured)
     kinds = [_NUMBERS.sub("#", reason) for reason in flights["reason"][failed]]
     first = dict(zip(reversed(kinds), reversed(failed.tolist()), strict=True))
+    reasons, runs = flights["reason"], flights["run"]
     return [
-        {
-            "reason": flights["reason"][first[kind]],
-            "count": count,
-            "first_run": int(flights["run"][first[kind]]),
-        }
+        {"reason": reasons[first[kind]], "count": count, "first_run": int(runs[first[kind]])}
         for kind, count in Counter(kinds).most_common(MOST_REASONS)
     ]
 
@@ -138,7 +132,7 @@ def _false_alarms(flights: Flights) -> Document:
     return {
         "count": count,
         "hours": number(hours),
-        **_estimate("per_hour", statistics.poisson(count, hours)),
+        **_estimate("per_hour", poisson(count, hours)),
         "closest_residual_ratio": number(float(np.nanmax(flights["worst_residual_ratio"], initial=0.0))),
     }
 
@@ -154,8 +148,6 @@ def _guarantee(flights: Flights) -> Document:
 
 def _by_fault(flights: Flights) -> list[Document]:
     """Detection and isolation of each kind of fault."""
-    labels = flights.fault_labels
-    groups = {label: labels == label for label in sorted(set(labels[flights.faulted]))}
     return [
         {
             "fault": label,
@@ -163,7 +155,7 @@ def _by_fault(flights: Flights) -> list[Document]:
             "detection": _detection(flights, flights.faulted & has_fault),
             "isolation": _isolation(flights, flights.faulted & has_fault),
         }
-        for label, has_fault in groups.items()
+        for label, has_fault in flights.by_fault.items()
     ]
 
 
@@ -208,76 +200,3 @@ def _sensitivity(flights: Flights) -> dict[str, Ranking]:
         name: rank({key: flights[key][group] for key in flights.vary}, outcome[group])
         for name, (group, outcome) in outcomes.items()
     }
-
-
-Bound = Callable[[float, bool], float]  # from (confidence, upper) to the one-sided bound of an estimate
-
-
-def evaluate(expect: SweepExpect, flights: Flights) -> list[Document]:
-    """A mapping {name, passed, expected, actual, of} for each expected limit, in the order of the file.
-
-    actual: the number that is compared with the limit, null if the flights do not give it. of: number of
-    flights on which it is based.
-    """
-    return [_verdict(flights, *bound) for bound in _bounds(expect)]
-
-
-def names(expect: SweepExpect) -> list[str]:
-    """The name of each expected limit, such as `departure_rate.at_most`, in the order of `evaluate`."""
-    return [f"{name}.{side}" for name, _, side in _bounds(expect)]
-
-
-def _bounds(expect: SweepExpect) -> Iterator[tuple[str, Level, str]]:
-    """(name, level, side) of each expected limit. side: `at_least` or `at_most`, the key of the limit in the
-    level."""
-    for name, level in expect:
-        axes = level if isinstance(level, AxisLevels) else ()
-        levels = [(f"{name}.{axis}", limits) for axis, limits in axes] or [(name, level)]
-        for full_name, limits in levels:
-            for side in ("at_least", "at_most"):
-                if limits is not None and getattr(limits, side) is not None:
-                    yield full_name, limits, side
-
-
-def _verdict(flights: Flights, name: str, level: Level, side: str) -> Document:
-    """The evaluation of one limit. With a confidence, the one-sided bound of the estimate must keep the
-    limit: the upper bound for `at_most`, the lower one for `at_least`. A limit without flights is not met."""
-    n_flights, value, bound = estimate_of(flights, name, level)
-    limit = getattr(level, side)
-    actual = value if level.confidence is None else bound(level.confidence, side == "at_most")
-    passed = actual >= limit if side == "at_least" else actual <= limit
-    other_side = "at_most" if side == "at_least" else "at_least"
-    return {
-        "name": name,
-        "passed": bool(n_flights > 0 and passed),
-        "expected": level.model_dump(exclude_none=True, exclude={other_side}),
-        "actual": number(actual),
-        "of": n_flights,
-    }
-
-
-def estimate_of(flights: Flights, name: str, level: Level) -> tuple[int, float, Bound]:
-    """(number of flights, estimate, its bound) of a quantity: a quantile, a rate of _RATES, or
-    `false_alarms_per_hour`."""
-    if isinstance(level, QuantileLevel):
-        quantity, _, axis = name.partition(".")
-        values = getattr(flights, quantity)  # a column, or a function from an axis to one
-        ordered = _sorted_without_nan((values(axis) if axis else values)[flights.faulted])
-        value = quantile(ordered, level.quantile)
-        return ordered.size, value, partial(statistics.quantile_bound, ordered, level.quantile)
-    if name in _RATES:
-        count, trials = _counts(*_RATES[name](flights))
-        return trials, wilson(count, trials).value, partial(statistics.wilson_bound, count, trials)
-    count, hours = flights.false_alarms
-    n = int(flights.measured.sum()) if hours > 0 else 0
-    return n, statistics.poisson(count, hours).value, partial(statistics.poisson_bound, count, hours)
-
-
-# By name of a rate: its hits, and the group in which they are counted.
-_RATES: dict[str, Callable[[Flights], tuple[np.ndarray, np.ndarray]]] = {
-    "detection_rate": lambda flights: (flights.detected, flights.faulted),
-    "isolation_rate": lambda flights: (flights.isolated, flights.faulted),
-    "departure_rate": lambda flights: (flights.departed, flights.measured),
-    "failure_rate": lambda flights: (~flights.measured, np.ones(len(flights), bool)),
-    "pass_rate": lambda flights: (flights["passed"], flights.measured),
-}

@@ -7,9 +7,9 @@ import pytest
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.studies import verify
+from beaver_ftc.studies import guarantees
+from beaver_ftc.studies.guarantees import fly_draw, judge
 from beaver_ftc.studies.random_flights import Draw
-from beaver_ftc.studies.verify import fly_draw, judge
 
 
 def landing(at_s=4.995, rate_hz=50.0, **changes):
@@ -78,5 +78,5 @@ def test_a_draw_without_a_trim_is_said(monkeypatch):
     def untrimmed(scenario):
         raise BadInput("no trim")
 
-    monkeypatch.setattr(verify, "fly", untrimmed)
+    monkeypatch.setattr(guarantees, "fly", untrimmed)
     assert fly_draw(Draw(1, "healthy", 3), {}) == {"index": 3, "skipped": "no trim"}

@@ -1,11 +1,4 @@
-"""The guarantees of the theory, tested in random flights within all that the diagnosis declares.
-
-    G1    no false alarm
-    G2    the true fault is not excluded, and no wrong fault is named
-    G3    the alarm comes at most a frame later than guaranteed
-
-A healthy flight tests G1. A faulty flight is flown with each scheme, and tests all three.
-"""
+"""The command `verify`: violations of the guarantees (guarantees.py) in many random flights."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -20,107 +13,17 @@ import typer
 from beaver_ftc.commands import Reporter, SeedOption, StudyCommand, WorkersOption
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.documents.files import Document
-from beaver_ftc.loop.loop import fly
-from beaver_ftc.loop.outcome import Landing
-from beaver_ftc.results.judgement import Truth, is_late
-from beaver_ftc.results.metrics import as_json, fault_free_s
-from beaver_ftc.scenario.faults import LossOfEffectiveness
-from beaver_ftc.scenario.signals import grown_share
+from beaver_ftc.results.metrics import as_json
 from beaver_ftc.studies.engine.statistics import CONFIDENCE, binomial, poisson_bound, share_within
 from beaver_ftc.studies.engine.study import Study, run_study
+from beaver_ftc.studies.guarantees import SCHEMES, SHARPENED, STEPS, Row, fly_draw
 from beaver_ftc.studies.present.page import Makers
-from beaver_ftc.studies.present.tables import finite, number_or_never
+from beaver_ftc.studies.present.tables import finite, known_values, number_or_never, sum_of, values_of
 from beaver_ftc.studies.random_flights import HEALTHY_S, KINDS, Draw
 
 ONE_SIDED = 2.0 * CONFIDENCE - 1.0  # confidence of a two-sided interval whose upper limit has CONFIDENCE
-PUBLISHED, SHARPENED = "published", "sharpened"
-_CONSTANT_ONLY = "constant"  # this step declares faults of constant size, and is not flown with growing ones
-_OFF = {"pole_bank": False, "memory": False, "shared_effectiveness": False}
-SCHEMES: dict[str, Document] = {PUBLISHED: {"thresholds": "published"}, SHARPENED: {}}
-# The steps from the published scheme to the default one; the last step needs a further declaration.
-STEPS: dict[str, Document] = {
-    PUBLISHED: SCHEMES[PUBLISHED],
-    "interval": {"sharpen": _OFF},
-    "pole bank": {"sharpen": {**_OFF, "pole_bank": True}},
-    "memory": {"sharpen": {"shared_effectiveness": False}},
-    SHARPENED: SCHEMES[SHARPENED],
-    _CONSTANT_ONLY: {"fault_profile": "abrupt"},
-}
 NAME = "verification"
 TOGETHER = 50  # flights in a file of the study
-
-Row = Document
-Schemes = dict[str, Document]
-
-
-def fly_draw(draw: Draw, schemes: Schemes) -> Row:
-    """The row of a flight. A flight with a fault is flown once with each scheme."""
-    try:
-        return _faulty(draw, schemes) if draw.kind == "faulty" else _healthy(draw)
-    except BadInput as error:  # a draw without a trim is reported, but not counted
-        return {"index": draw.index, "skipped": str(error)}
-
-
-def _healthy(draw: Draw) -> Row:
-    """The row of a flight without a fault. One flight tests both schemes, since the first filter of the
-    sharpened scheme is that of the published one. closest: largest |residual| / threshold of each scheme."""
-    flight = fly(draw.scenario())
-    of_filters = flight.closest_approach
-    return {
-        "index": draw.index,
-        "watched_s": fault_free_s(flight),
-        "alarm": flight.detection_time_s is not None,
-        "departed": flight.departure is not None,
-        "outside_s": flight.outside_s,
-        "closest": {PUBLISHED: of_filters[0], SHARPENED: max(of_filters)},
-    }
-
-
-def _faulty(draw: Draw, schemes: Schemes) -> Row:
-    """The row of a flight with a fault: an outcome for each scheme, then the fault. A growing fault has the
-    outcome of the sharpened scheme under _CONSTANT_ONLY, so that all steps count the same faults."""
-    row: Row = {"index": draw.index}
-    for scheme, fdi in schemes.items():
-        scenario = draw.scenario(fdi)
-        abrupt = scenario.faults[0].profile == "abrupt"
-        row[scheme] = judge(fly(scenario)) if abrupt or scheme != _CONSTANT_ONLY else row[SHARPENED]
-    frame = {"rate_hz": scenario.rate_hz, "substeps": scenario.substeps}
-    return row | frame | scenario.faults[0].model_dump(exclude_none=True)
-
-
-def judge(flight: Landing) -> Row:
-    """The outcome of a flight with one fault. Delays are in s from the first frame with the fault;
-    false_alarm, late, excluded, wrong: whether a guarantee is violated."""
-    truth = Truth.of(flight.scenario)
-    guaranteed_s = flight.guaranteed_delay_s
-    alarm_s = flight.detection_time_s
-    delay_s = truth.onset.delay_s(alarm_s)
-    is_false = alarm_s is not None and truth.onset.is_false(alarm_s)
-    not_excluded = (*flight.candidates, flight.isolated)
-    rightly_named = truth.faults_named_rightly_by(flight.isolated, flight.isolation_time_s)
-    return {
-        "delay_s": delay_s,
-        "false_alarm": is_false,
-        "guaranteed_s": guaranteed_s,
-        "late": guaranteed_s is not None
-        and not is_false
-        and (delay_s is None or is_late(delay_s, guaranteed_s, 1.0 / flight.scenario.rate_hz)),
-        "isolation_delay_s": truth.onset.delay_s(flight.isolation_time_s),
-        "excluded": alarm_s is not None
-        and not any(truth.faults[0].is_named_by(name) for name in not_excluded),
-        "wrong": flight.isolated is not None and not rightly_named,
-        "estimate_error": _estimate_error(flight) if rightly_named else None,
-    }
-
-
-def _estimate_error(flight: Landing) -> float | None:
-    """|theta_estimated - theta| at the end of the flight, theta = -magnitude times the share to which the
-    loss has grown; None without an estimate, and for another fault."""
-    fault = flight.scenario.faults[0]
-    if flight.estimate is None or not isinstance(fault, LossOfEffectiveness):
-        return None
-    grown = grown_share(fault, flight.frames / flight.scenario.rate_hz)
-    return abs(flight.estimate + fault.magnitude * grown)
 
 
 class Promise(NamedTuple):
@@ -154,8 +57,8 @@ def summarise(rows: dict[str, list[Row]]) -> Document:
     document: Document = {
         "healthy": _healthy_document(healthy),
         "faults": len(faulty),
-        "skipped": sum("skipped" in row for kind in KINDS for row in rows[kind]),
-        "schemes": {scheme: _scheme([row[scheme] for row in faulty]) for scheme in schemes},
+        "skipped": sum(map(len, rows.values())) - len(healthy) - len(faulty),
+        "schemes": {scheme: _scheme(values_of(faulty, scheme)) for scheme in schemes},
     }
     if faulty:
         document["delay_shorter_by"] = _shorter(document["schemes"])
@@ -166,16 +69,16 @@ def summarise(rows: dict[str, list[Row]]) -> Document:
 
 def _healthy_document(rows: Sequence[Row]) -> Document:
     """False alarms and flight hours of the healthy flights."""
-    hours = sum(row["watched_s"] for row in rows) / 3600.0
-    alarms = sum(row["alarm"] for row in rows)
+    hours = sum_of(rows, "watched_s") / 3600.0
+    alarms = sum_of(rows, "alarm")
     return {
         "flights": len(rows),
         "hours": hours,
         "false_alarms": alarms,
         "false_alarms_per_hour": alarms / hours if hours else None,
         "false_alarms_per_hour_upper_95": finite(poisson_bound(alarms, hours, CONFIDENCE, upper=True)),
-        "departures": sum(row["departed"] for row in rows),
-        "hours_outside_envelope": sum(row["outside_s"] for row in rows) / 3600.0,
+        "departures": sum_of(rows, "departed"),
+        "hours_outside_envelope": sum_of(rows, "outside_s") / 3600.0,
         "closest_approach": {
             scheme: max(row["closest"][scheme] for row in rows) for scheme in SCHEMES if rows
         },
@@ -186,32 +89,29 @@ def _scheme(rows: Sequence[Row]) -> Document:
     """Violations, detections, delays and errors of one scheme. rows: its outcomes. delay_over_guaranteed: of
     the detected faults alone, without a delay of 0 s."""
     n = len(rows)
-    counts = {promise: sum(row[kind.broken] for row in rows) for promise, kind in PROMISES.items()}
-    certain = [row for row in rows if row["guaranteed_s"] is not None]
-    timed = [row for row in certain if row["guaranteed_s"] and row["delay_s"] is not None]
-    ratios = [row["delay_s"] / row["guaranteed_s"] for row in timed]
-    errors = [row["estimate_error"] for row in rows if row["estimate_error"] is not None]
+    counts = {promise: sum_of(rows, kind.broken) for promise, kind in PROMISES.items()}
+    detected = [row for row in rows if row["delay_s"] is not None]
+    ratios = [row["delay_s"] / row["guaranteed_s"] for row in detected if row["guaranteed_s"]]
     return {
         **counts,
         **{
             f"{name}_probability_upper_95": binomial(count, n, ONE_SIDED).high
             for name, count in counts.items()
         },
-        "detected": sum(row["delay_s"] is not None for row in rows),
-        "isolated": sum(row["isolation_delay_s"] is not None for row in rows),
-        "detection_certain": len(certain),
-        "delay_s": _quantiles(row["delay_s"] for row in rows),
-        "isolation_delay_s": _quantiles(row["isolation_delay_s"] for row in rows),
+        "detected": len(detected),
+        "isolated": len(known_values(rows, "isolation_delay_s")),
+        "detection_certain": len(known_values(rows, "guaranteed_s")),
+        "delay_s": _quantiles(values_of(rows, "delay_s")),
+        "isolation_delay_s": _quantiles(values_of(rows, "isolation_delay_s")),
         "delay_over_guaranteed": _quantiles(ratios),
-        "estimate_error": _quantiles(errors),
+        "estimate_error": _quantiles(known_values(rows, "estimate_error")),
     }
 
 
-def _quantiles(values: Iterable[float | None]) -> dict[str, float | None]:
+def _quantiles(values: Sequence[float | None]) -> Document:
     """Median and 90 % quantile. A value None is an event that never came, and infinite; an infinite quantile
     is None."""
-    all_values = list(values)
-    return {name: finite(share_within(all_values, share)) for name, share in (("median", 0.5), ("p90", 0.9))}
+    return {name: finite(share_within(values, share)) for name, share in (("median", 0.5), ("p90", 0.9))}
 
 
 def _shorter(schemes: Document) -> float | None:

@@ -13,7 +13,7 @@ from beaver_ftc.studies.compare.sets import SetFlight
 from beaver_ftc.studies.compare.trial import LAW, SCHEME, Entry, Trial, fly_case
 from beaver_ftc.studies.engine.study import Study
 from beaver_ftc.studies.present import page
-from beaver_ftc.studies.present.tables import Columns, aligned, bare_percent, tabulated
+from beaver_ftc.studies.present.tables import Columns, aligned, bare_percent
 
 Cell = Callable[[Document], str]
 
@@ -68,17 +68,14 @@ CONTROL: Columns = (
 )
 
 
-def sections(part: Document) -> list[tuple[list[str], list[list[str]], list[str]]]:
-    """(header, rows, sentences) of the schemes with our law, and of the laws with our scheme. The sentence
-    says which is better; there is none if no flight has a fault."""
+def sections(part: Document) -> Iterator[tuple[page.Table, list[str]]]:
+    """The table of the schemes with our law, and that of the laws with our scheme, each with the sentence
+    that says which is better; without it if no flight has a fault."""
     lines = [row | {"free": part["without_false_alarm"].get(row["scheme"])} for row in part["lines"]]
-    schemes = [row for row in lines if row["law"] == LAW]
-    laws = [row for row in lines if row["scheme"] == SCHEME]
     best = part["who_is_better"]
-    return [
-        (*tabulated(columns, rows), [best[kind]] if best else [])
-        for kind, columns, rows in (("schemes", DIAGNOSIS, schemes), ("laws", CONTROL, laws))
-    ]
+    for kind, columns, key, ours in (("schemes", DIAGNOSIS, "law", LAW), ("laws", CONTROL, "scheme", SCHEME)):
+        table = page.table(columns, [row for row in lines if row[key] == ours])
+        yield table, [best[kind]] if best else []
 
 
 def as_text(document: Document) -> str:
@@ -86,8 +83,8 @@ def as_text(document: Document) -> str:
     blocks = []
     for name, part in document["sets"].items():
         blocks.append(f"{name}: {part['flights']} flights")
-        for header, rows, first in sections(part):
-            blocks.append("\n".join([aligned([header, *rows]), *first, ""]))
+        for table, first in sections(part):
+            blocks.append("\n".join([aligned([table.head, *table.rows]), *first, ""]))
         blocks += part["better_than_ours"] + [f"could not fly: {error}" for error in part["errors"]]
         blocks.append("")
     return "\n".join(blocks)
@@ -120,8 +117,8 @@ def _sets(document: Document) -> Iterator[page.Part]:
     """Heading, tables and sentences of each set."""
     for name, part in document["sets"].items():
         yield page.Heading(f"{name}: {part['flights']} flights")
-        for header, rows, first in sections(part):
-            yield page.Table(header, rows)
+        for table, first in sections(part):
+            yield table
             yield from first
         losses = [f"{sentence}." for sentence in part["better_than_ours"]]
         nothing = "nothing here: in these tables no rival has a better number than ours, us/frame aside."

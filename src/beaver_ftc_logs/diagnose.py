@@ -13,19 +13,15 @@ import numpy as np
 from beaver_ftc.documents import BadInput
 from beaver_ftc_logs import column_mistakes, energy, trust
 from beaver_ftc_logs.bank import build_bank
-from beaver_ftc_logs.energy import UNKNOWN_SURFACE
 from beaver_ftc_logs.filtering import bank_posterior
 from beaver_ftc_logs.groups import expand_groups
 from beaver_ftc_logs.log_rows import LogRows, at_log_stamps
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.posterior_rows import NO_RESPONSE_LIMIT, rows_of_posterior
-from beaver_ftc_logs.recording import MIN_DIVISOR, Mask
-from beaver_ftc_logs.regression import innovations
-from beaver_ftc_logs.runs import trailing_sums
+from beaver_ftc_logs.recording import Mask
 from beaver_ftc_logs.samples import Samples
 
 _LOG_RATE_TOLERANCE = 0.25  # largest relative difference between the sample rate of a log and of the model
-_DIRECTION_WINDOW_S = 1.0  # the direction of the residual is judged over this time
 # Largest motion of a command, a share of travel, that may be rounding.
 _COMMAND_ROUNDING = 1e-6
 
@@ -56,13 +52,9 @@ def _diagnose_checked_log(samples: Samples, model: Model) -> LogRows:
     """The rows of a flight whose columns fit the model. P (n, H): probabilities of the hypotheses, of which
     the last is that nothing answers the commands; silent (n,): where this is likely."""
     bank = build_bank(model)
-    known = trust.without_dead_rows(samples, model)
-    P = bank_posterior(known, model, bank)
+    P = bank_posterior(trust.without_dead_rows(samples, model), model, bank)
     silent = P[:, -1] > NO_RESPONSE_LIMIT
-    rows = rows_of_posterior(samples, model, bank, P)
-    if model.vehicle.other_laws and model.settings.threshold is not None and not model.colours:
-        rows = _withdraw_contradicted(known, model, rows, model.settings.threshold)
-    return finish_rows(samples, model, rows, silent)
+    return finish_rows(samples, model, rows_of_posterior(samples, model, bank, P), silent)
 
 
 def finish_rows(samples: Samples, model: Model, rows: LogRows, silent: Mask | None = None) -> LogRows:
@@ -118,32 +110,6 @@ def _withdraw_by_engine(samples: Samples, model: Model, rows: LogRows) -> LogRow
         rows.t_s, rows.faulty, rows.isolated_surfaces, rate_mps, unpowered_mps, rows.evidence_start_time_s
     )
     return replace(rows.without_estimate(named != rows.isolated_surfaces), isolated_surfaces=named)
-
-
-def _withdraw_contradicted(samples: Samples, model: Model, rows: LogRows, threshold: float) -> LogRows:
-    """Rows with the name `unknown` where the residual of the last second lies along another group.
-
-    A faulty surface (stuck, biased or oscillating) changes the rates along the direction of its healthy
-    effect. A name is withdrawn if the direction of another group explains more of the residual, by more than
-    the log likelihood `threshold`. Not used if there are noise models, since gusts have directions too.
-
-        gain_g = power / 2 sum over the last second of (r' m_g / |m_g|)^2
-
-    r (n, 3): residual in standard deviations. m (3, G): whitened direction of each group.
-    """
-    flight = innovations(samples, model)
-    r = flight.e @ flight.W
-    m = (np.array(model.response).sum(axis=1) @ flight.W).T
-    norms = np.linalg.norm(m, axis=0)
-    square = (r @ (m / np.maximum(norms, MIN_DIVISOR))) ** 2
-    gain = 0.5 * model.settings.power * trailing_sums(square, _DIRECTION_WINDOW_S * model.rate_hz)[0]
-    best = gain.max(axis=1)
-    wrong = np.zeros(len(r), dtype=bool)
-    for g, group in enumerate(model.groups):
-        names_group = [not set(group).isdisjoint(name.split("+")) for name in rows.isolated_surfaces]
-        wrong |= np.array(names_group, dtype=bool) & (best - gain[:, g] > threshold)
-    names = np.where(wrong, UNKNOWN_SURFACE, rows.isolated_surfaces)
-    return replace(rows.without_estimate(wrong), isolated_surfaces=names)
 
 
 def check_log_fits_model(samples: Samples, model: Model) -> None:

@@ -15,10 +15,9 @@ from beaver_ftc_logs.physics import CIRCLE_SLACK, AngleFit, fit_angle
 from beaver_ftc_logs.recording import Column, Columns, largest_magnitude
 from beaver_ftc_logs.units import ACCELERATION, ANGLE, RATE, SI_UNITS, UNIT_FACTORS, nearest_unit
 
-# Magnitudes of the correlation of an angle's change with the integral of a rate (`_replacing_correlation`):
-_EXCHANGED = 0.2  # below this the rate is that of another axis
+# Magnitudes of the correlation of an angle's change with the integral of a rate:
 _AGREEING = 0.7  # above this the two belong together, whatever the unit of the rate
-_CLOSE = 0.95
+_CLOSE = 0.95  # above this another column is the rate of an angle that does not agree with the named one
 _EXACT = 0.99  # above this the angle confirms the rate, if the slope is within _UNIT_RATIO of 1
 # Slopes between its inverse and itself show no other unit: no two units differ by so little
 _SLOPE_FACTOR = 1.8
@@ -45,11 +44,8 @@ def attitude_mistake(named: Columns, angles: Sequence[NamedColumn | None], other
 def _mistakes_of_axis(
     named: Columns, angles: Sequence[NamedColumn | None], others: Columns, axis: int
 ) -> Iterator[str]:
-    """Yield the texts of mistakes in one rate and its angle, the surest first:
-
-    1. the size of a pitch angle, 2. another column follows the angle, 3. the slope, if the correlation of
-    rate and angle is at least _AGREEING, 4. otherwise another unit of the rate.
-    """
+    """Yield the texts of mistakes in one rate and its angle: the size of a pitch angle; then, if rate and
+    angle agree, the slope; otherwise other columns and other units of the rate that agree with the angle."""
     angle = angles[axis]
     rate = [*named][axis]
     if angle is None:
@@ -59,25 +55,25 @@ def _mistakes_of_axis(
     fit = _fit_with(named, angles, axis, named[rate])
     if fit is None:
         return
+    if abs(fit.correlation) >= _AGREEING:
+        if remark := _factor_remark(fit, (rate, named[rate]), angle):
+            yield remark
+        return
     for name, column in (named | others).items():
         trial = _fit_with(named, angles, axis, column)
-        if trial is not None and abs(trial.correlation) > _replacing_correlation(fit, is_rate=name in named):
+        if trial is not None and abs(trial.correlation) > _CLOSE:
             yield (
                 f"{angle[0]} does not follow {rate} (correlation {fit.correlation:.2f}) "
                 f"but {name} ({trial.correlation:.2f}): {name} is the {_RATE_TITLES[axis]}"
             )
-    if remark := _factor_remark(fit, (rate, named[rate]), angle):
-        yield remark
-    if abs(fit.correlation) < _AGREEING:
-        # In a banked flight, q turns the yaw angle too, so a yaw rate in another unit need not correlate with
-        # it.
-        for factor in UNIT_FACTORS:
-            scaled = replace(named[rate], values=factor * named[rate].values)
-            if _is_exact(_fit_with(named, angles, axis, scaled)):
-                yield (
-                    f"the {_RATE_TITLES[axis]} {rate} does not make the change of its angle "
-                    f"(correlation {fit.correlation:.2f}): a factor of {factor:.4g} on {rate} fits"
-                )
+    # In a banked flight, q turns the yaw angle too, so a yaw rate in another unit need not correlate with it.
+    for factor in UNIT_FACTORS:
+        scaled = replace(named[rate], values=factor * named[rate].values)
+        if _is_exact(_fit_with(named, angles, axis, scaled)):
+            yield (
+                f"the {_RATE_TITLES[axis]} {rate} does not make the change of its angle "
+                f"(correlation {fit.correlation:.2f}): a factor of {factor:.4g} on {rate} fits"
+            )
 
 
 def _fit_with(
@@ -99,35 +95,17 @@ def _is_exact(fit: AngleFit | None) -> bool:
     return fit is not None and fit.correlation > _EXACT and 1.0 / _UNIT_RATIO < fit.slope < _UNIT_RATIO
 
 
-def _replacing_correlation(fit: AngleFit, is_rate: bool) -> float:
-    """Correlation above which another column, rather than the named one, is the rate of an angle.
-
-        correlation of the named rate        another column is the rate above
-        below _EXCHANGED                     _AGREEING if it is a named rate, otherwise _CLOSE
-        below _AGREEING                      _CLOSE
-        below _CLOSE                         _EXACT
-        otherwise                            never
-
-    fit: of the named rate. is_rate: whether the other column is a named rate, too.
-    """
-    corr = abs(fit.correlation)
-    if is_rate and corr < _EXCHANGED:
-        return _AGREEING
-    return _CLOSE if corr < _AGREEING else _EXACT if corr < _CLOSE else np.inf
-
-
 def _factor_remark(fit: AngleFit, named_rate: NamedColumn, named_angle: NamedColumn) -> str | None:
     """Text of a mistake in a rate or its angle by the slope, with the factor that fits; None if there is
     none.
 
     A slope near -1 is a wrong sign. Otherwise either may be wrong. The text names the angle if it exceeds a
     full circle and a unit fits; else the rate if no vehicle turns so fast and a unit fits; else both. Its
-    factors are magnitudes: if the slope, which the text shows, is negative, the sign is wrong too. There is
-    no text if rate and angle hardly correlate.
+    factors are magnitudes: if the slope, which the text shows, is negative, the sign is wrong too.
     """
     slope = abs(fit.slope)
     is_near_one = 1.0 / _SLOPE_FACTOR < slope < _SLOPE_FACTOR
-    if abs(fit.correlation) < _AGREEING or (is_near_one and fit.slope > 0.0):
+    if is_near_one and fit.slope > 0.0:
         return None
     rate_name, rate = named_rate
     angle_name, angle = named_angle

@@ -19,7 +19,6 @@ _CLIPPED_IN_TURN = 3
 _CLIPPED_IN_ALL = 10
 _SPIKE_RATIO = 40.0  # the steps to and from a spike exceed this times the usual step
 _MAX_SPIKE_SHARE = 0.01  # if a larger share of the rows are spikes, the signal is noisy and has none
-_MAX_RATE_SD_RAD_S = 3.0  # a rate with a larger standard deviation may be in another unit
 
 
 def time_since_change_s(column: Column) -> Floats:
@@ -87,8 +86,7 @@ def column_defect_texts(name: str, column: Column, is_rate: bool) -> list[str]:
 
 
 def _rate_defect_texts(name: str, column: Column) -> Iterator[str]:
-    """Yield a line for each defect that only a measured rate shows: frozen, clipped, with spikes, too
-    wide."""
+    """Yield a line for each defect that only a measured rate shows: frozen, clipped, with spikes."""
     values = column.values
     still_s = float(time_since_change_s(column).max(initial=0.0))
     if still_s > MIN_STILL_S:
@@ -100,7 +98,3 @@ def _rate_defect_texts(name: str, column: Column) -> Iterator[str]:
     if len(spikes):
         jumps = "1 jump" if len(spikes) == 1 else f"{len(spikes)} jumps"
         yield f"{name}: {jumps}, the first at {column.t_s[spikes[0]]:.2f} s"
-    sd = float(np.nanstd(values))
-    if sd > _MAX_RATE_SD_RAD_S:
-        hint = "is it in deg/s? a factor of 0.01745 fits (`unit: deg/s`)"
-        yield f"{name}: spreads {sd:.3g} rad/s, as hardly an aircraft does: {hint}"

@@ -1,14 +1,13 @@
 """Mistakes in the columns of a log: exchanged columns, another sign or unit. A log with one is refused.
 
-A large residual may come from a fault, from the air, or from such a mistake. There are three tests:
+A large residual may come from a fault, from the air, or from such a mistake. There are two tests (a third
+compares the size of the motions: `motion_units`):
 
-1. All rates move much more or less than in the flights of the model (`refuse_rate_unit`). In a fit: a
-   command moves much more or less than in the first flight (`refuse_command_unit`).
-2. The gain of a command is opposite to that of the model, or as small or large as its motion is large or
+1. The gain of a command is opposite to that of the model, or as small or large as its motion is large or
    small (`_command_mistakes`).
-3. The log has a higher score with one mistake corrected (`mistake_gains`).
+2. The log has a higher score with one mistake corrected (`mistake_gains`).
 
-A mistake is there from the first sample to the last, so tests 2 and 3 must find it in each of four parts.
+A mistake is there from the first sample to the last, so a test must find it in each of four parts.
 
     lo, hi          lowest lower and highest upper bound of a group's gain over the parts, 1 in the model
     R, ma           covariance and moving average of the noise, as in `regression`
@@ -21,7 +20,6 @@ It is no likelihood, since q comes from a median, on which faults of few samples
 log likelihood, at its maximum over trim, gains and variance, has the mean square instead.
 """
 
-from collections.abc import Sequence
 from itertools import compress
 from typing import NamedTuple
 
@@ -30,31 +28,21 @@ import numpy as np
 from beaver_ftc.documents import BadInput
 from beaver_ftc_logs import regression
 from beaver_ftc_logs.corrected_logs import altered_log, corrected_logs
-from beaver_ftc_logs.model import FittedRanges, Model
-from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
+from beaver_ftc_logs.model import Model
+from beaver_ftc_logs.motion_units import MAX_ALIKE_FACTOR, ONE_UNIT, relative_motion
+from beaver_ftc_logs.recording import Floats
 from beaver_ftc_logs.samples import Samples
-from beaver_ftc_logs.trust import central_ranges, known_effects, known_gains, unknown_surfaces
-from beaver_ftc_logs.units import RATE, SI_UNITS, nearest_unit
+from beaver_ftc_logs.trust import known_effects, known_gains, unknown_surfaces
 from beaver_ftc_logs.whitening import NOISE_MA_CANDIDATES, whiten_samples
 
-# All rates are in the same unit if their motions, relative to the flights of the model, differ by less than
-# this factor.
-_MAX_AXIS_RATIO = 10.0
-# The motions may differ by the square of this factor from those of the unit that is guessed from them.
-_UNIT_FACTOR_ROOT = 1.6
-# A motion differs between flights by this factor at most.
-_MAX_ALIKE_FACTOR = 3.0
-# Another unit changes a motion by this factor at least.
-_MIN_UNIT_FACTOR = 12.0
-_ONE_UNIT = "one unit (57.3 is deg for rad, 100 percent: `unit`, `scale`)"
 # The text of each kind of mistake. group: its name; motion: over that in the flights of the model.
 _COMMAND_MISTAKES = {
     "sign": "the rates answer the command of {group} the other way round in all of it "
     "(does `scale: -1` fit?)",
     "weak": "the command of {group} moves {motion:.3g} times as much as in the flights of the model, and "
-    "does at most {gain:.2g} of what it did: " + _ONE_UNIT,
+    "does at most {gain:.2g} of what it did: " + ONE_UNIT,
     "strong": "the command of {group} moves {motion:.3g} times as much as in the flights of the model, and "
-    "does at least {gain:.3g} times what it did: " + _ONE_UNIT,
+    "does at least {gain:.3g} times what it did: " + ONE_UNIT,
 }
 # A command whose upper bound on the gain is below this has the opposite effect. In 576 correct logs with
 # faults of any kind, the least of these bounds was 0.98, in light turbulence 0.93 (`own_logs.py`, seeds 31 to
@@ -69,59 +57,6 @@ _REVERSED_GAIN_LIMIT = -0.5
 _FALSE_MISTAKE_CHANCE = 0.001
 # A flight of at least twice as many samples is reduced, to no fewer than these, to save computing time.
 _MAX_COMPARED_SAMPLES = 8000
-
-
-def refuse_rate_unit(samples: Samples, ranges: FittedRanges) -> None:
-    """Raise BadInput where all rates spread so much more or less than in the flights of the model that they
-    are in another unit."""
-    if not ranges.rates:
-        return
-    ratios = _relative_motion(samples.rates, ranges.rates)
-    if not ratios.max() < _MAX_AXIS_RATIO * ratios.min():  # also if an axis has no number: its ratio is 0
-        return
-    ratio = float(np.exp(np.mean(np.log(ratios))))
-    hints = (
-        (1.0 / ratio, "a factor of {to_si:.4g} (`unit: {unit}`) fits"),
-        (ratio, "a factor of {from_si:.4g} fits: the model's own were in {unit}?"),
-    )
-    for size, hint in hints:
-        unit = nearest_unit(RATE, size, _UNIT_FACTOR_ROOT**2)
-        if unit not in (None, "rad/s"):
-            to_si = SI_UNITS[unit][1]
-            text = hint.format(to_si=to_si, from_si=1.0 / to_si, unit=unit)
-            raise BadInput(
-                f"{samples.name}: rates spread {ratio:.3g} times as widely as in the flights of the model, "
-                f"allowed: rates in rad/s; {text}"
-            )
-
-
-def refuse_command_unit(flight: Samples, first: Samples, surfaces: Sequence[str]) -> None:
-    """Raise BadInput where the motion of a command, over that in another flight, `first`, shows another unit.
-
-    rates                               motion of the command that is refused
-    each between 1 / 3 and 3 times      below 1 / 12, or above 12 times
-    otherwise                           above 12 times the largest motion of a rate, or 12 if that is larger
-
-    The factors are _MAX_ALIKE_FACTOR and _MIN_UNIT_FACTOR. A motion beyond 1e-4 to 1e4 is not judged here.
-    """
-    rate_ratios = _relative_motion(flight.rates, central_ranges(first.rates))
-    alike = rate_ratios.min() > 1.0 / _MAX_ALIKE_FACTOR and rate_ratios.max() < _MAX_ALIKE_FACTOR
-    allowed = _MIN_UNIT_FACTOR * (1.0 if alike else max(rate_ratios.max(), 1.0))
-    ratios = _relative_motion(flight.commands, central_ranges(first.commands))
-    for surface, ratio in zip(surfaces, ratios.tolist(), strict=True):
-        if allowed < ratio < 1e4 or (alike and 1e-4 < ratio < 1.0 / _MIN_UNIT_FACTOR):
-            raise BadInput(
-                f"{flight.name}: the command of {surface} moves {ratio:.3g} times as much as in the other "
-                f"flights, the rates {rate_ratios.max():.2g} times at most, allowed: {_ONE_UNIT}"
-            )
-
-
-def _relative_motion(values: Floats, reference: Sequence[Sequence[float]]) -> Floats:
-    """Width of the central range of each column of values (n, S) over that of the reference ranges, (S,)."""
-    spans, usual_spans = (
-        np.ptp(np.array(pairs).reshape(-1, 2), axis=1) for pairs in (central_ranges(values), reference)
-    )
-    return spans / np.maximum(usual_spans, MIN_DIVISOR)
 
 
 # Key: kind of the mistake (_COMMAND_MISTAKES), and name of the group. Value: motion of the command over that
@@ -161,7 +96,7 @@ def answers(samples: Samples, model: Model, least_samples: float = np.inf) -> An
 
 
 def refuse_columns(samples: Samples, model: Model) -> None:
-    """Raise BadInput if tests 2 or 3 find a mistake in the columns of a flight.
+    """Raise BadInput if a test finds a mistake in the columns of a flight.
 
     A model that knows the effect of no surface refuses no flight.
     """
@@ -218,15 +153,15 @@ def _command_mistakes(samples: Samples, model: Model, measured: Answers) -> Comm
 
     kind        condition
     sign        hi < MAX_REVERSED_GAIN
-    weak        hi < _MIN_COMMAND_GAIN, and the command moves more than _MAX_ALIKE_FACTOR times as much
-    strong      lo > 1 / _MIN_COMMAND_GAIN, and the command moves, but less than 1 / _MAX_ALIKE_FACTOR as much
+    weak        hi < _MIN_COMMAND_GAIN, and the command moves more than MAX_ALIKE_FACTOR times as much
+    strong      lo > 1 / _MIN_COMMAND_GAIN, and the command moves, but less than 1 / MAX_ALIKE_FACTOR as much
 
     Kinds weak and strong require that the gain is known (`known_gains`).
     """
     mistakes = {}
     surfaces = list(model.vehicle.surfaces)
     fitted = model.fitted.commands
-    motions = _relative_motion(samples.commands, fitted) if fitted else np.zeros(len(surfaces))
+    motions = relative_motion(samples.commands, fitted) if fitted else np.zeros(len(surfaces))
     highest = measured.upper.max(axis=0)
     lowest = measured.lower.min(axis=0)
     for group, is_known, hi, lo in zip(model.groups, known_gains(model), highest, lowest, strict=True):
@@ -234,9 +169,9 @@ def _command_mistakes(samples: Samples, model: Model, measured: Answers) -> Comm
         motion = max(motions[surfaces.index(surface)] for surface in group)
         if hi < MAX_REVERSED_GAIN:
             mistakes["sign", name] = motion, hi
-        elif is_known and hi < _MIN_COMMAND_GAIN and motion > _MAX_ALIKE_FACTOR:
+        elif is_known and hi < _MIN_COMMAND_GAIN and motion > MAX_ALIKE_FACTOR:
             mistakes["weak", name] = motion, hi
-        elif is_known and lo > 1.0 / _MIN_COMMAND_GAIN and 0.0 < motion < 1.0 / _MAX_ALIKE_FACTOR:
+        elif is_known and lo > 1.0 / _MIN_COMMAND_GAIN and 0.0 < motion < 1.0 / MAX_ALIKE_FACTOR:
             mistakes["strong", name] = motion, lo
     return mistakes
 

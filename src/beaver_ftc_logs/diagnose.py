@@ -17,6 +17,7 @@ from beaver_ftc_logs.filtering import bank_posterior
 from beaver_ftc_logs.groups import expand_groups
 from beaver_ftc_logs.log_rows import LogRows, at_log_stamps
 from beaver_ftc_logs.model import Model
+from beaver_ftc_logs.motion_units import refuse_rate_unit
 from beaver_ftc_logs.posterior_rows import NO_RESPONSE_LIMIT, rows_of_posterior
 from beaver_ftc_logs.recording import Mask
 from beaver_ftc_logs.samples import Samples
@@ -120,5 +121,5 @@ def check_log_fits_model(samples: Samples, model: Model) -> None:
             f"{samples.name}: has samples at {rate_hz:.3g} Hz, allowed: within {_LOG_RATE_TOLERANCE:.0%} of "
             f"the {model.rate_hz:.3g} Hz the model was identified at"
         )
-    column_mistakes.refuse_rate_unit(samples, model.fitted)
+    refuse_rate_unit(samples, model.fitted)
     column_mistakes.refuse_columns(trust.without_dead_rows(samples, model), model)

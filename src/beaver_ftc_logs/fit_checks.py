@@ -6,9 +6,9 @@ import numpy as np
 
 from beaver_ftc.results import Document
 from beaver_ftc_logs import orders, regression
+from beaver_ftc_logs.fit_parts import Parts, one_step_residuals
 from beaver_ftc_logs.least_squares import spectral_density, variance_inflation
 from beaver_ftc_logs.model import Model
-from beaver_ftc_logs.regression import Parts
 
 # Regressors are reported if the others inflate the variance of their coefficient more than this.
 LEAST_INFLATION = 10.0
@@ -55,7 +55,7 @@ def density_ratios(parts: Parts, model: Model) -> list[Document]:
 
     The frequency 0 is left out, and so is a band that holds none of the frequencies of the density.
     """
-    e = orders.one_step_residuals(parts, model)
+    e = one_step_residuals(parts, model)
     f, density = spectral_density(e, model.rate_hz)
     white = e.var(axis=0) / (0.5 * model.rate_hz)
     bands = []

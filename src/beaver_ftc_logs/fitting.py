@@ -1,7 +1,6 @@
 """Fit: from recorded flights to a model with the settings of the filter that diagnoses later flights.
 
-Letters as in `orders`; r is the variance of the noise. A *part left out* is a flight, or half of one, that a
-fit did not use (`folds`).
+A *part left out* is a flight, or half of one, that a fit did not use (`folds`). r: variance of the noise.
 """
 
 from itertools import groupby
@@ -10,12 +9,13 @@ import numpy as np
 
 from beaver_ftc.results import Document
 from beaver_ftc_logs import least_squares
+from beaver_ftc_logs.fit_parts import Parts
 from beaver_ftc_logs.folds import held_out_folds
-from beaver_ftc_logs.gains import gain_overdispersion, widen_noise
+from beaver_ftc_logs.gains import gain_overdispersion
 from beaver_ftc_logs.model import FilterSettings, Model
+from beaver_ftc_logs.noise_inflation import widen_noise
 from beaver_ftc_logs.orders import bic_by_order, fitted_order
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
-from beaver_ftc_logs.regression import Parts
 from beaver_ftc_logs.vehicle import Vehicle
 
 # Three tables of settings that healthy flights do not show, in the units of `FilterSettings`; then values of

@@ -1,7 +1,7 @@
 """Fit models with a part left out in turn, and predict that part.
 
 Every figure of merit comes from parts left out: the two halves of a single flight in turn, or each of several
-flights in turn. Letters as in `orders`. A *fold* is a part left out with the model of the others.
+flights in turn. A *fold* is a part left out with the model of the others.
 """
 
 from collections.abc import Iterator
@@ -11,10 +11,11 @@ import numpy as np
 
 from beaver_ftc.results import Document
 from beaver_ftc_logs import regression
+from beaver_ftc_logs.effect_errors import group_gain_sd, tied_shares
+from beaver_ftc_logs.fit_parts import FitPart, Parts
 from beaver_ftc_logs.model import FittedRanges, Model
-from beaver_ftc_logs.orders import fit_of, group_gain_sd, one_step_innovations, refit, tied_shares
+from beaver_ftc_logs.orders import fit_of, refit
 from beaver_ftc_logs.recording import MIN_DIVISOR
-from beaver_ftc_logs.regression import FitPart, Parts
 
 _MAX_SPLITS = 12  # largest number of refits, to limit the time of `identify`
 
@@ -68,7 +69,7 @@ def prediction_quality(fold: Fold) -> Document:
     """For each axis the share of the rates' variance that one-step prediction explains, 1 - var(e) / var(y),
     and the standard deviation of the residual e, rad/s; y: the rates. Without a sample, only their number
     0."""
-    flight = one_step_innovations(fold.model, fold.held_out)
+    flight = fold.held_out.one_step_innovations(fold.model)
     y = fold.held_out.samples.rates[flight.rows]
     e = flight.e
     if not len(y):

@@ -9,9 +9,9 @@ import numpy as np
 
 from beaver_ftc.results import Document
 from beaver_ftc_logs import regression
+from beaver_ftc_logs.fit_parts import Parts, usual_step_s
 from beaver_ftc_logs.groups import Groups, group_commands
 from beaver_ftc_logs.recording import Floats
-from beaver_ftc_logs.regression import Parts
 
 _WINDOW_S = 2.0  # length of a free run
 _MIN_WINDOWS = 20  # with fewer windows, lag and delay are not fitted
@@ -31,7 +31,7 @@ def fit_output_error(parts: Parts, groups: Groups) -> Document:
     """
     from scipy.optimize import least_squares
 
-    dt_s = regression.usual_step_s(parts)
+    dt_s = usual_step_s(parts)
     u, y = _cut_windows(parts, groups, round(_WINDOW_S / dt_s), round(_MAX_DELAY_S / dt_s) + 1)
     if len(y) < _MIN_WINDOWS or not np.ptp(y, axis=(0, 1)).all():
         return {"windows": len(y), "says": "too few gap-free windows in which every rate moves"}

@@ -6,15 +6,16 @@ import numpy as np
 
 from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document
-from beaver_ftc_logs import extremes, fitting, gyro_noise, orders, regression, validation
-from beaver_ftc_logs.column_mistakes import refuse_command_unit
+from beaver_ftc_logs import extremes, fitting, gyro_noise, regression, validation
 from beaver_ftc_logs.fit_checks import collinear_regressors, density_ratios, median_inflation
+from beaver_ftc_logs.fit_parts import Parts, fit_parts, one_step_residuals
 from beaver_ftc_logs.folds import fold_qualities
 from beaver_ftc_logs.free_runs import fit_output_error
 from beaver_ftc_logs.groups import group_indices
 from beaver_ftc_logs.model import Model, NoiseModel
+from beaver_ftc_logs.motion_units import refuse_command_unit
+from beaver_ftc_logs.noise_models import AR_ORDER
 from beaver_ftc_logs.preparation import assume_law_and_air, whiten_flights
-from beaver_ftc_logs.regression import Parts
 from beaver_ftc_logs.samples import Samples
 from beaver_ftc_logs.vehicle import Vehicle
 from beaver_ftc_logs.whitening import UNFITTED_GYROS_RAD_S, UNFITTED_MA, whiten_samples
@@ -28,7 +29,7 @@ def identify(flights: Sequence[Samples], vehicle: Vehicle) -> Model:
     vehicle, lines = assume_law_and_air(flights, vehicle)
     for flight in flights[1:]:
         refuse_command_unit(flight, flights[0], list(vehicle.surfaces))
-    parts = orders.fit_parts(whiten_flights(flights, vehicle))
+    parts = fit_parts(whiten_flights(flights, vehicle))
     model = fitting.fit_model(parts, vehicle)
     check_explained(fold_qualities(parts, model), parts, model)
     model = add_unseen_noise(validation.add_ranges_and_threshold(parts, model), flights)
@@ -77,11 +78,11 @@ def add_unseen_noise(model: Model, flights: Sequence[Samples]) -> Model:
     models = list(model.colours)
     for ma in UNFITTED_MA:
         if ma not in known:
-            parts = orders.fit_parts([whiten_samples(flight, ma) for flight in flights])
-            e = orders.one_step_residuals(parts, model)
+            parts = fit_parts([whiten_samples(flight, ma) for flight in flights])
+            e = one_step_residuals(parts, model)
             models.append(NoiseModel(average=list(ma), noise=np.cov(e.T).tolist(), **shared_fields))
     for gyro_sd in UNFITTED_GYROS_RAD_S:
-        ar, R = gyro_noise.yule_walker_predictor(model, Q, gyro_sd, orders.AR_ORDER)
+        ar, R = gyro_noise.yule_walker_predictor(model, Q, gyro_sd, AR_ORDER)
         models.append(NoiseModel(average=[1.0], before=ar.tolist(), noise=R.tolist(), **shared_fields))
     return model.model_copy(update={"colours": models})
 

@@ -12,12 +12,12 @@ from beaver_ftc.results import SERIES_COLOURS as SERIES
 from beaver_ftc.studies.present import panels
 from beaver_ftc_logs import orders
 from beaver_ftc_logs.fit_checks import regressor_names
+from beaver_ftc_logs.fit_parts import Parts, fit_parts, one_step_residuals
 from beaver_ftc_logs.folds import Fold, held_out_folds
 from beaver_ftc_logs.least_squares import Regression, spectral_density
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.pages import encode_png, label_axis, load_template
 from beaver_ftc_logs.recording import Floats
-from beaver_ftc_logs.regression import Parts
 from beaver_ftc_logs.samples import Samples
 
 PAGE_MARK = '<meta name="generator" content="beaver-ftc identify">'
@@ -34,7 +34,7 @@ def refuse_foreign_file(path: Path) -> None:
 
 def render_identification(flights: Sequence[Samples], model: Model) -> str:
     """The page as HTML text."""
-    usable = orders.fit_parts(flights)
+    usable = fit_parts(flights)
     # The model keeps the standard errors of its responses only. The page shows those of all coefficients and
     # their correlation, in a fit to the flights as they are, not whitened.
     fit = orders.fit_order(usable, model.vehicle, model.history, model.lags)
@@ -82,7 +82,7 @@ def _liveliest_window(fold: Fold, n: int) -> tuple[Floats, Floats, Floats]:
     """Times (n,), s, rates and residual (n, 3), rad/s, of the n samples with the largest sum of squared known
     rates; NaN where a rate is not known: the drawn line ends there. The whole flight if it is shorter."""
     samples = fold.held_out.samples
-    known = orders.one_step_innovations(fold.model, fold.held_out)
+    known = fold.held_out.one_step_innovations(fold.model)
     rates, residual = np.full((2, *samples.rates.shape), np.nan)
     rates[known.rows] = samples.rates[known.rows]
     residual[known.rows] = known.e
@@ -94,7 +94,7 @@ def _liveliest_window(fold: Fold, n: int) -> tuple[Floats, Floats, Floats]:
 
 def _spectrum_figure(usable: Parts, model: Model) -> Any:
     """Density of the residual by frequency, and that of white noise of the same variance."""
-    residual = orders.one_step_residuals(usable, model)
+    residual = one_step_residuals(usable, model)
     f_hz, power = spectral_density(residual, model.rate_hz)
     figure, ((axis,),) = panels(1, 1, 7.5, 3.2)
     for i, name in enumerate("pqr"):

@@ -12,6 +12,7 @@ import numpy as np
 
 from beaver_ftc.documents import BadInput
 from beaver_ftc_logs import orders
+from beaver_ftc_logs.fit_parts import fit_parts
 from beaver_ftc_logs.groups import group_surfaces
 from beaver_ftc_logs.least_squares import left_by
 from beaver_ftc_logs.loading import have_labels
@@ -115,7 +116,7 @@ def _scaled(flights: Sequence[Samples], vehicle: Vehicle) -> list[Samples]:
 
 def _min_bic(flights: Sequence[Samples], vehicle: Vehicle) -> float:
     """The least Bayesian information criterion over all orders."""
-    return min(orders.bic_by_order(orders.fit_parts(flights), vehicle).values())
+    return min(orders.bic_by_order(fit_parts(flights), vehicle).values())
 
 
 def whiten_flights(flights: Sequence[Samples], vehicle: Vehicle) -> list[Samples]:
@@ -146,7 +147,7 @@ def whiten_flights(flights: Sequence[Samples], vehicle: Vehicle) -> list[Samples
         # The commands have as many lags as the rates, not their largest number: the kept results depend on
         # it.
         h = max(orders.RATE_LAGS)
-        return orders.stack_data(orders.fit_parts(flights), vehicle, h, h)[:2]
+        return orders.stack_data(fit_parts(flights), vehicle, h, h)[:2]
 
     def own_residual(flight: Samples, ma: tuple[float, ...]) -> Floats:
         """Residual (n, 3) of the fit to one flight, whitened by a moving average."""

@@ -21,10 +21,8 @@
 Groups of surfaces are those of `groups`: their surfaces move together and have one response.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -41,42 +39,6 @@ _MIN_PART_ROWS = 60  # least number of rows in each
 BOUND_MARGIN = 4.0  # standard errors from a gain to its bounds
 # A response is quick if it differs from its mean over so many seconds.
 _QUICK_SPAN_S = 0.5
-
-
-@dataclass(frozen=True)
-class FitPart:
-    """A flight (or half of one) and which of its samples the fit may use, is_usable (n,).
-
-    fits: the cache of `orders.fitted_order`, which describes its keys and values: fits to lists of parts that
-    begin with this one.
-    """
-
-    samples: Samples
-    is_usable: Mask
-    fits: dict[Any, Any] = field(default_factory=dict, repr=False, compare=False)
-
-    @cached_property
-    def halves(self) -> tuple["FitPart", "FitPart"]:
-        """The usable samples in two halves."""
-        rows = np.flatnonzero(self.is_usable)
-        middle = int(rows[len(rows) // 2]) if len(rows) else 0
-        is_first = np.arange(len(self.is_usable)) < middle
-        first = FitPart(self.samples, self.is_usable & is_first)
-        return first, FitPart(self.samples, self.is_usable & ~is_first)
-
-    def innovations(self, model: Model) -> "Innovations":
-        """The innovations of the usable samples by a model. Commands are multiplied by the labelled
-        effectiveness."""
-        flight = innovations(self.samples, model, labelled=True)
-        return flight.at(np.flatnonzero(self.is_usable & flight.is_known))
-
-
-Parts = Sequence[FitPart]
-
-
-def usual_step_s(parts: Parts) -> float:
-    """The usual step of the samples of all flights, s."""
-    return float(np.median([part.samples.dt_s for part in parts]))
 
 
 def build_regressors(

@@ -14,9 +14,9 @@ from itertools import compress
 import numpy as np
 
 from beaver_ftc_logs import energy, regression
+from beaver_ftc_logs.fit_parts import Parts
 from beaver_ftc_logs.model import FittedRanges, Model
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats, Mask, Reasons
-from beaver_ftc_logs.regression import Parts
 from beaver_ftc_logs.runs import trailing_sums
 from beaver_ftc_logs.samples import Samples
 from beaver_ftc_logs.signals import MIN_STILL_S
@@ -44,8 +44,8 @@ def compute_fitted_ranges(parts: Parts, tied: Floats, gain_sd: Floats) -> Fitted
     """Compute the ranges in which a model was fitted.
 
     tied (G,): share of the effect of each group on the rates that past rates, signals and the other groups
-    explain (`orders.tied_shares`). gain_sd (G,): standard error of the gain of each group, 1 in the model, in
-    parts not fitted.
+    explain (`effect_errors.tied_shares`). gain_sd (G,): standard error of the gain of each group, 1 in the
+    model, in parts not fitted.
     """
 
     def usable(name: str) -> Floats:

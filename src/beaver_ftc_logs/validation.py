@@ -8,14 +8,16 @@ from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document
 from beaver_ftc_logs import extremes, trust
 from beaver_ftc_logs.bank import build_bank
+from beaver_ftc_logs.effect_errors import group_gain_sd, tied_shares
 from beaver_ftc_logs.filtering import bank_posterior, fault_evidence, page_cusum
+from beaver_ftc_logs.fit_parts import Parts
 from beaver_ftc_logs.folds import Fold, fold_qualities, held_out_folds
 from beaver_ftc_logs.gains import squared_deviations
 from beaver_ftc_logs.model import Model
-from beaver_ftc_logs.orders import GAIN_SD_CAP, fit_of, group_gain_sd, tied_shares
+from beaver_ftc_logs.noise_models import GAIN_SD_CAP
+from beaver_ftc_logs.orders import fit_of
 from beaver_ftc_logs.posterior_rows import NO_RESPONSE_LIMIT, rows_of_posterior
 from beaver_ftc_logs.recording import Floats
-from beaver_ftc_logs.regression import Parts
 from beaver_ftc_logs.runs import runs_between
 from beaver_ftc_logs.scoring import score_against_labels
 

@@ -19,14 +19,13 @@ from beaver_ftc.studies.engine import poisson
 from beaver_ftc_logs import scoring
 from beaver_ftc_logs.detectors import detector_names, diagnose_by_freeze_rule, diagnose_with_detector
 from beaver_ftc_logs.energy import ENGINE
+from beaver_ftc_logs.fit_parts import FitPart, fit_parts
 from beaver_ftc_logs.fitting import fit_model
 from beaver_ftc_logs.folds import validation_folds
 from beaver_ftc_logs.loading import read_vehicle_columns
 from beaver_ftc_logs.log_rows import LogRows
 from beaver_ftc_logs.model import FilterSettings, Model
-from beaver_ftc_logs.orders import fit_parts
 from beaver_ftc_logs.recording import RecordedFlight
-from beaver_ftc_logs.regression import FitPart
 from beaver_ftc_logs.samples import Samples, resample
 from beaver_ftc_logs.validation import add_ranges_and_threshold, score_folds
 from beaver_ftc_logs.vehicle import Vehicle, load_vehicle

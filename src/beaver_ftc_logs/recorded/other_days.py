@@ -17,13 +17,12 @@ from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document
 from beaver_ftc_logs import scoring
 from beaver_ftc_logs.detectors import OUR_DETECTOR, diagnose_with_detector
+from beaver_ftc_logs.fit_parts import FitPart, fit_parts
 from beaver_ftc_logs.fitting import fit_model
 from beaver_ftc_logs.folds import validation_folds
 from beaver_ftc_logs.model import Model
-from beaver_ftc_logs.orders import fit_parts
 from beaver_ftc_logs.recorded import benchmark
 from beaver_ftc_logs.recording import Floats
-from beaver_ftc_logs.regression import FitPart
 from beaver_ftc_logs.samples import Samples, mixer_matrix
 
 TUNING_SEEDS = range(8)

@@ -7,8 +7,8 @@ import pytest
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs import fitting, gains, orders, validation
+from beaver_ftc_logs.fit_parts import FitPart, fit_parts, usable_mask
 from beaver_ftc_logs.recording import LoggedFailure
-from beaver_ftc_logs.regression import FitPart
 from products.logs import small
 
 MODEL = small.model()
@@ -42,7 +42,7 @@ USED = {  # at 2 Hz: three samples at either edge of a label, all of what lasts 
 @pytest.mark.parametrize("name", USED)
 def test_which_samples_are_known(name):
     parts, used = USED[name]
-    assert np.flatnonzero(orders.usable_mask(labelled(parts))).tolist() == used
+    assert np.flatnonzero(usable_mask(labelled(parts))).tolist() == used
 
 
 def test_what_follows_a_failure_is_not_fitted():
@@ -50,7 +50,7 @@ def test_what_follows_a_failure_is_not_fitted():
     samples = labelled(
         [(20, NAN, NAN)], logged_failures=(LoggedFailure(6.0, "rudder"), LoggedFailure(5.0, "elevator"))
     )
-    assert np.flatnonzero(orders.usable_mask(samples)).tolist() == list(range(8))
+    assert np.flatnonzero(usable_mask(samples)).tolist() == list(range(8))
 
 
 def test_a_fit_wants_ten_samples_a_coefficient():
@@ -74,12 +74,12 @@ def test_what_no_model_file_can_hold_is_refused(changes, key):
     changed = {"rates": lambda by: samples.rates[:, by], "commands": lambda by: samples.commands * by}
     told = replace(samples, **{name: changed[name](by) for name, by in changes.items()})
     with pytest.raises(BadInput, match=f"no model file can hold the {key} of this fit, allowed: three rates"):
-        orders.fitted_order(orders.fit_parts([told]), MODEL.vehicle, 2, 3)
+        orders.fitted_order(fit_parts([told]), MODEL.vehicle, 2, 3)
 
 
 @pytest.fixture(scope="module")
 def usable_flights():
-    return orders.fit_parts([small.flight(MODEL, 1000, lost=LOST)])
+    return fit_parts([small.flight(MODEL, 1000, lost=LOST)])
 
 
 @pytest.fixture(scope="module")
@@ -100,7 +100,7 @@ def days(gains):
     """Flights of days on which the right surface acts so many times as the left one does."""
     flown = [small.flight(MODEL, 1500, seed=20 + i, name=f"day-{i}") for i in range(len(gains))]
     told = [replace(one, labels=np.full_like(one.labels, np.nan)) for one in flown]
-    return orders.fit_parts(
+    return fit_parts(
         [replace(one, commands=one.commands / [gain, 1.0]) for one, gain in zip(told, gains, strict=True)]
     )
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from beaver_ftc_logs import orders
+from beaver_ftc_logs.fit_parts import fit_parts
 from beaver_ftc_logs.free_runs import fit_output_error
 from beaver_ftc_logs.preparation import scale_if_better
 from products.logs import small
@@ -56,7 +56,7 @@ def lagged(n=1200, lag_s=0.1, delay_s=0.13, seed=4, noise=0.002):
 
 
 def test_servo_lag_and_delay_are_found():
-    found = fit_output_error(orders.fit_parts([lagged()]), [[0], [1]])
+    found = fit_output_error(fit_parts([lagged()]), [[0], [1]])
     assert found["servo_lag_s"] == pytest.approx(0.1, abs=0.02)
     assert found["delay_s"] == pytest.approx(0.13, abs=0.02)
     assert min(found["explained_of_windows_not_fitted"].values()) > 0.98

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc_logs import column_mistakes, fitting, gyro_noise, loading, orders, preparation
+from beaver_ftc_logs import column_mistakes, fitting, gyro_noise, loading, preparation
 from beaver_ftc_logs.bank import build_bank
 from beaver_ftc_logs.filtering import bank_posterior
+from beaver_ftc_logs.fit_parts import fit_parts
 from beaver_ftc_logs.whitening import whiten_samples
 from products.logs import small
 
@@ -37,7 +38,7 @@ VEHICLE = small.vehicle(
 
 
 def fitted(flights):
-    return fitting.fit_model(orders.fit_parts(flights), VEHICLE)
+    return fitting.fit_model(fit_parts(flights), VEHICLE)
 
 
 @pytest.fixture(scope="module")

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from beaver_ftc_logs.diagnose import diagnose
+from beaver_ftc_logs.fit_parts import fit_parts
 from beaver_ftc_logs.fitting import fit_model
 from beaver_ftc_logs.folds import validation_folds
 from beaver_ftc_logs.loading import load_flights_for_fit
-from beaver_ftc_logs.orders import fit_parts
 from beaver_ftc_logs.scoring import score_against_failures, score_against_labels
 from beaver_ftc_logs.validation import add_ranges_and_threshold
 from beaver_ftc_logs.vehicle import load_vehicle

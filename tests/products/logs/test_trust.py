@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc_logs import column_mistakes, identification, orders, validation
+from beaver_ftc_logs import identification, motion_units, validation
 from beaver_ftc_logs.diagnose import diagnose
+from beaver_ftc_logs.effect_errors import tied_shares
 from beaver_ftc_logs.findings import as_text, verdict_document
+from beaver_ftc_logs.fit_parts import fit_parts
 from products.logs import small
 
 HEALTHY = small.flight(small.model(), n=1200, seed=2)
@@ -17,7 +19,7 @@ HEALTHY = small.flight(small.model(), n=1200, seed=2)
 def trusted(flown=HEALTHY, **changes):
     """A model by hand that knows what it was fitted on."""
     model = small.model(**changes)
-    usable_flights = orders.fit_parts([flown])
+    usable_flights = fit_parts([flown])
     return validation.add_ranges_and_threshold(usable_flights, model)
 
 
@@ -93,7 +95,7 @@ def test_a_rate_that_never_stood_still_may_for_half_a_second(model, usual, most)
 def test_rates_in_another_unit_than_the_models_own(model, factor, says):
     flown = small.flight(model, n=300, seed=4, rates=HEALTHY.rates[:300] * factor)
     if says is None:
-        column_mistakes.refuse_rate_unit(flown, model.fitted)
+        motion_units.refuse_rate_unit(flown, model.fitted)
         return
     with pytest.raises(BadInput, match=says):
         diagnose(flown, model)
@@ -104,8 +106,8 @@ def test_what_the_law_ties_together_is_not_claimed(model):
     flown = small.flight(model, n=2000, seed=3)
     follows = np.vstack([np.zeros(3), flown.rates[:-1]]) @ [0.4, -0.3, 0.2]
     commands = np.column_stack([follows, flown.commands[:, 1]])
-    share = orders.tied_shares(
-        orders.fit_parts([small.flight(model, n=2000, commands=commands, rates=flown.rates)]),
+    share = tied_shares(
+        fit_parts([small.flight(model, n=2000, commands=commands, rates=flown.rates)]),
         small.model(history=4, lags=3),
     )
     assert share[0] > 0.98
@@ -113,13 +115,13 @@ def test_what_the_law_ties_together_is_not_claimed(model):
     loose = 1000.0 * (follows + 0.05 * follows.std() * np.random.default_rng(4).standard_normal(2000))
     commands[:, 0] = loose  # all but 1 of 400, of an effect that is a million times the noise
     far = small.flight(model, n=2000, commands=commands, rates=flown.rates)
-    assert orders.tied_shares(orders.fit_parts([far]), small.model(history=4, lags=3))[0] == 0.0
+    assert tied_shares(fit_parts([far]), small.model(history=4, lags=3))[0] == 0.0
 
 
 def test_a_model_that_explains_less_than_the_mean_is_refused():
     """By the mean over its tests, each with its samples; with what was noted of the rates."""
     frozen = replace(HEALTHY, notes=("q_rad_s: stands still for 600 s", "pitch: another"))
-    flights, model = orders.fit_parts([frozen]), small.model()
+    flights, model = fit_parts([frozen]), small.model()
 
     def held_out(*of):
         return [{"samples": n, "explained": dict(zip("pqr", shares, strict=True))} for n, *shares in of]
@@ -154,6 +156,6 @@ def test_a_command_in_another_unit_is_refused_where_rates_move_alike_or_far_less
     flown = replace(first, commands=commands * [1.0, factor], rates=rates * [1.0, turned, 1.0])
     if refused:
         with pytest.raises(BadInput, match=rf"log: the command of elevator moves {factor:g} times"):
-            column_mistakes.refuse_command_unit(flown, first, ["aileron", "elevator"])
+            motion_units.refuse_command_unit(flown, first, ["aileron", "elevator"])
     else:
-        column_mistakes.refuse_command_unit(flown, first, ["aileron", "elevator"])
+        motion_units.refuse_command_unit(flown, first, ["aileron", "elevator"])

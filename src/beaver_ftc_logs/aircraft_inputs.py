@@ -13,6 +13,7 @@ from beaver_ftc.documents import BadInput
 from beaver_ftc.loop import FLOW, Diagnosis
 from beaver_ftc.results import Document
 from beaver_ftc_logs.recording import Column, Floats, Mask, RecordedFlight, largest_magnitude
+from beaver_ftc_logs.refusals import refusal
 from beaver_ftc_logs.runs import Runs, true_runs
 from beaver_ftc_logs.samples import Samples, convert_to_si, resample
 from beaver_ftc_logs.time_base import sample_column
@@ -121,9 +122,10 @@ def read_inputs(log: RecordedFlight, vehicle: Vehicle, diagnosed: DiagnosedAircr
     arrays = InputArrays(samples.rates, np.column_stack(list(flow.values())), commands, attitude)
     inputs = LogInputs(samples, aircraft, diagnosis, rate_hz, arrays, ages, full_rad)
     if not inputs.gap_free_stretches:
-        raise BadInput(
-            f"{samples.name}: has no {_MIN_SAMPLES} samples in turn, evenly spaced and without a missing "
-            f"number, allowed: all signals logged at one rate of {_MIN_HZ:g} to {_MAX_HZ:g} Hz"
+        raise refusal(
+            samples.name,
+            f"has no {_MIN_SAMPLES} samples in turn, evenly spaced and without a missing number",
+            f"all signals logged at one rate of {_MIN_HZ:g} to {_MAX_HZ:g} Hz",
         )
     return inputs
 
@@ -134,10 +136,13 @@ def _flow_columns(log: RecordedFlight, vehicle: Vehicle, aircraft: Aircraft) -> 
     surface."""
     missing = [name for name in aircraft.surfaces if name not in vehicle.surfaces]
     if missing:
-        allowed = f"what the commands make of {', '.join(aircraft.surfaces)}"
-        raise BadInput(f"vehicle {vehicle.name}: surfaces: no {missing[0]}, allowed: {allowed}")
+        raise refusal(
+            f"vehicle {vehicle.name}",
+            f"surfaces: no {missing[0]}",
+            f"what the commands make of {', '.join(aircraft.surfaces)}",
+        )
     if vehicle.airspeed is None:
-        raise BadInput(f"vehicle {vehicle.name}: airspeed: is missing, allowed: its column, of true airspeed")
+        raise refusal(f"vehicle {vehicle.name}", "airspeed: is missing", "its column, of true airspeed")
     signals = (*FLOW, *aircraft.signals)
     names = [name for name in signals if name != "airspeed_mps"]
     for name in names:
@@ -166,8 +171,11 @@ def _log_rate_hz(samples: Samples) -> float:
     even_s = steps_s[np.abs(steps_s / samples.dt_s - 1.0) < _STEP_JITTER]
     rate_hz = float(f"{1.0 / (even_s.mean() if len(even_s) else samples.dt_s):.4g}")
     if not _MIN_HZ <= rate_hz <= _MAX_HZ:
-        reason = f"an aircraft's model takes {_MIN_HZ:g} to {_MAX_HZ:g} Hz"
-        raise BadInput(f"{samples.name}: is logged at {rate_hz:g} Hz, allowed: {reason}")
+        raise refusal(
+            samples.name,
+            f"is logged at {rate_hz:g} Hz",
+            f"an aircraft's model takes {_MIN_HZ:g} to {_MAX_HZ:g} Hz",
+        )
     return rate_hz
 
 
@@ -176,23 +184,29 @@ def _check_plausible(flight: str, flow: Mapping[str, Floats], commands: Floats, 
     for name in ("alpha_rad", "beta_rad"):
         median = _median_without_nan(np.abs(flow[name]))
         if median > 0.5 * pi:
-            raise BadInput(f"{flight}: flow.{name} is {median:.3g} in the middle, allowed: rad; `unit: deg`?")
+            raise refusal(flight, f"flow.{name} is {median:.3g} in the middle", "rad; `unit: deg`?")
     airspeed = flow["airspeed_mps"]
     qdyn = flow["qdyn_pa"]
     flies = airspeed > 0.5 * aircraft.envelope.airspeed_mps[0]
     rho = _median_without_nan(2.0 * qdyn[flies] / airspeed[flies] ** 2)
     if rho <= _DENSITIES_KG_M3[0] or rho >= _DENSITIES_KG_M3[1]:
-        reason = f"airspeed and flow.qdyn_pa make a density of {rho:.3g} kg/m3"
         allowed = "{:g} to {:g}".format(*_DENSITIES_KG_M3)
-        raise BadInput(f"{flight}: {reason}, allowed: {allowed}, true airspeed in m/s and Pa")
+        raise refusal(
+            flight,
+            f"airspeed and flow.qdyn_pa make a density of {rho:.3g} kg/m3",
+            f"{allowed}, true airspeed in m/s and Pa",
+        )
     for surface, command in zip(aircraft.surfaces, commands.T, strict=True):
         travel = aircraft.travel[surface]
         stop_rad = max(abs(travel.min_rad), abs(travel.max_rad))
         max_rad = largest_magnitude(command)
         if max_rad > _STOP_RATIO * stop_rad:
-            reason = f"the command of {surface} reaches {max_rad:.3g} rad"
             allowed = f"its stop, {stop_rad:.3g} rad"
-            raise BadInput(f"{flight}: {reason}, allowed: {allowed}; full_deflection_rad says what 1 is")
+            raise refusal(
+                flight,
+                f"the command of {surface} reaches {max_rad:.3g} rad",
+                f"{allowed}; full_deflection_rad says what 1 is",
+            )
 
 
 def _median_without_nan(values: Floats) -> float:

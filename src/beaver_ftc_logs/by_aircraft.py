@@ -22,6 +22,7 @@ from beaver_ftc_logs.column_mistakes import MAX_REVERSED_GAIN
 from beaver_ftc_logs.diagnose import reversed_command_error
 from beaver_ftc_logs.log_rows import LogRows
 from beaver_ftc_logs.recording import Floats, Mask, Reasons, RecordedFlight
+from beaver_ftc_logs.refusals import refusal
 from beaver_ftc_logs.stepped import Replayed, error_sections, named_since, replay_samples, rows_of_replay
 from beaver_ftc_logs.vehicle import Vehicle
 
@@ -99,9 +100,11 @@ def _refuse_reversed(inputs: LogInputs, upper: Floats) -> None:
     name = inputs.aircraft.name
     for surface, bound in zip(inputs.aircraft.surfaces, upper, strict=True):
         if bound < MAX_REVERSED_GAIN:
-            reason = f"the rates answer the command of {surface} the other way round in all of it"
-            allowed = f"signs as of {name}; does `scale: -1` fit?"
-            raise BadInput(f"{inputs.samples.name}: {reason}, allowed: {allowed}")
+            raise refusal(
+                inputs.samples.name,
+                f"the rates answer the command of {surface} the other way round in all of it",
+                f"signs as of {name}; does `scale: -1` fit?",
+            )
 
 
 def _credible_rows(inputs: LogInputs, replay: Replayed) -> LogRows:

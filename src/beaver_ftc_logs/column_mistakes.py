@@ -25,12 +25,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from beaver_ftc.documents import BadInput
 from beaver_ftc_logs import regression
 from beaver_ftc_logs.corrected_logs import altered_log, corrected_logs
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.motion_units import MAX_ALIKE_FACTOR, ONE_UNIT, relative_motion
 from beaver_ftc_logs.recording import Floats
+from beaver_ftc_logs.refusals import refusal
 from beaver_ftc_logs.samples import Samples
 from beaver_ftc_logs.trust import known_effects, known_gains, unknown_surfaces
 from beaver_ftc_logs.whitening import NOISE_MA_CANDIDATES, whiten_samples
@@ -112,9 +112,7 @@ def refuse_columns(samples: Samples, model: Model) -> None:
         for (kind, group), (motion, gain) in mistakes.items()
     )
     if text := next(texts, None) or _likelier_mistake(flight, own_model):
-        raise BadInput(
-            f"{samples.name}: {text}, allowed: columns, signs and units as in the flights of the model"
-        )
+        raise refusal(samples.name, text, "columns, signs and units as in the flights of the model")
 
 
 def _lasting_mistakes(samples: Samples, model: Model, measured: Answers) -> CommandMistakes:

@@ -13,6 +13,7 @@ import typer
 from beaver_ftc.cli import Document, Format, FormatOption, answer
 from beaver_ftc.commands import declare
 from beaver_ftc.documents import BadInput
+from beaver_ftc_logs.refusals import refusal
 
 if TYPE_CHECKING:
     from beaver_ftc_logs.log_rows import LogRows
@@ -57,7 +58,7 @@ def identify(
         return
     if vehicle is None or out is None:
         option = "--vehicle" if vehicle is None else "--out"
-        raise BadInput(f"identify: {option} is missing, allowed: --vehicle FILE --out MODEL, or --check")
+        raise refusal("identify", f"{option} is missing", "--vehicle FILE --out MODEL, or --check")
     from beaver_ftc_logs.identification import identify
     from beaver_ftc_logs.identification_page import refuse_foreign_file, render_identification
     from beaver_ftc_logs.identification_text import identification_text
@@ -231,27 +232,24 @@ def _check_options_agree(options: DiagnoseOptions) -> None:
     by_aircraft = options.aircraft is not None
     by_model = options.model is not None
     names_detector = options.detector != "bank-of-filters"
-    if by_aircraft and by_model:
-        raise BadInput("diagnose: --model and --aircraft: allowed: one of them")
-    if by_aircraft and names_detector:
-        reason = f"--detector {options.detector}: allowed: none, fdi.scheme of --scenario names it"
-        raise BadInput(f"diagnose: --aircraft with {reason}")
-    needs_aircraft = {
-        f"--scenario {options.scenario}": options.scenario is not None,
-        f"--vehicle {options.vehicle}": options.vehicle is not None,
-        "--certificate": options.certificate,
+    alone = not by_aircraft
+    without_model = not (by_aircraft or by_model)
+    only_aircraft = "allowed: only with --aircraft NAME"
+    only_model = "allowed: only with --model MODEL or --aircraft NAME"
+    aircraft_with = f"--aircraft with --detector {options.detector}"
+    mistakes = {
+        "--model and --aircraft: allowed: one of them": by_aircraft and by_model,
+        f"{aircraft_with}: allowed: none, fdi.scheme of --scenario names it": by_aircraft and names_detector,
+        f"--scenario {options.scenario}: {only_aircraft}": options.scenario is not None and alone,
+        f"--vehicle {options.vehicle}: {only_aircraft}": options.vehicle is not None and alone,
+        f"--certificate: {only_aircraft}": options.certificate and alone,
+        f"--score: {only_model}": options.score and without_model,
+        f"--detector: {only_model}": names_detector and without_model,
+        f"--reader: {only_model}": options.reader is not None and without_model,
     }
-    needs_diagnosis = {
-        "--score": options.score,
-        "--detector": names_detector,
-        "--reader": options.reader is not None,
-    }
-    for option, is_given in needs_aircraft.items():
-        if is_given and not by_aircraft:
-            raise BadInput(f"diagnose: {option}: allowed: only with --aircraft NAME")
-    for option, is_given in needs_diagnosis.items():
-        if is_given and not (by_aircraft or by_model):
-            raise BadInput(f"diagnose: {option}: allowed: only with --model MODEL or --aircraft NAME")
+    for mistake, is_made in mistakes.items():
+        if is_made:
+            raise BadInput(f"diagnose: {mistake}")
 
 
 def _diagnose_with_aircraft(options: DiagnoseOptions) -> None:
@@ -278,7 +276,7 @@ def _diagnose_with_aircraft(options: DiagnoseOptions) -> None:
         check_exists(path)
         beside = Path(os.path.abspath(path)).parent / "vehicle.yaml"
         if options.vehicle is None and not beside.is_file():
-            raise BadInput(f"{path}: no vehicle.yaml beside it, allowed: --vehicle FILE")
+            raise refusal(path, "no vehicle.yaml beside it", "--vehicle FILE")
         loaded, mixing = load_vehicle_for_logs(options.vehicle or str(beside), [path], options.reader)
         texts += mixing
         for log in read_vehicle_parts(path, loaded, options.reader):

@@ -20,6 +20,7 @@ from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.motion_units import refuse_rate_unit
 from beaver_ftc_logs.posterior_rows import NO_RESPONSE_LIMIT, rows_of_posterior
 from beaver_ftc_logs.recording import Mask
+from beaver_ftc_logs.refusals import refusal
 from beaver_ftc_logs.samples import Samples
 
 _LOG_RATE_TOLERANCE = 0.25  # largest relative difference between the sample rate of a log and of the model
@@ -117,9 +118,10 @@ def check_log_fits_model(samples: Samples, model: Model) -> None:
     """Raise BadInput if the sample rate, the units or the columns of a log are not those of the model."""
     rate_hz = 1.0 / samples.dt_s
     if abs(rate_hz / model.rate_hz - 1.0) > _LOG_RATE_TOLERANCE:
-        raise BadInput(
-            f"{samples.name}: has samples at {rate_hz:.3g} Hz, allowed: within {_LOG_RATE_TOLERANCE:.0%} of "
-            f"the {model.rate_hz:.3g} Hz the model was identified at"
+        raise refusal(
+            samples.name,
+            f"has samples at {rate_hz:.3g} Hz",
+            f"within {_LOG_RATE_TOLERANCE:.0%} of the {model.rate_hz:.3g} Hz the model was identified at",
         )
     refuse_rate_unit(samples, model.fitted)
     column_mistakes.refuse_columns(trust.without_dead_rows(samples, model), model)

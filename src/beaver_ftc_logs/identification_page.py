@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.documents import BadInput
 from beaver_ftc.results import SERIES_COLOURS as SERIES
 from beaver_ftc.studies.present import panels
 from beaver_ftc_logs import orders
@@ -18,6 +17,7 @@ from beaver_ftc_logs.least_squares import Regression, spectral_density
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.pages import encode_png, label_axis, load_template
 from beaver_ftc_logs.recording import Floats
+from beaver_ftc_logs.refusals import refusal
 from beaver_ftc_logs.samples import Samples
 
 PAGE_MARK = '<meta name="generator" content="beaver-ftc identify">'
@@ -29,7 +29,7 @@ def refuse_foreign_file(path: Path) -> None:
     """Raise BadInput if the page would replace a file that is no page of `identify`."""
     is_page = path.is_file() and PAGE_MARK in path.read_text("utf-8", errors="replace")[:2000]
     if path.exists() and not is_page:
-        raise BadInput(f"will not replace {path}: it is no page of `identify`, allowed: another --out")
+        raise refusal(f"will not replace {path}", "it is no page of `identify`", "another --out")
 
 
 def render_identification(flights: Sequence[Samples], model: Model) -> str:

@@ -7,6 +7,7 @@ import numpy as np
 from beaver_ftc.documents import BadInput
 from beaver_ftc_logs.model import FittedRanges
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
+from beaver_ftc_logs.refusals import refusal
 from beaver_ftc_logs.samples import Samples
 from beaver_ftc_logs.trust import central_ranges
 from beaver_ftc_logs.units import RATE, SI_UNITS, nearest_unit
@@ -41,9 +42,10 @@ def refuse_rate_unit(samples: Samples, ranges: FittedRanges) -> None:
         if unit not in (None, "rad/s"):
             to_si = SI_UNITS[unit][1]
             text = hint.format(to_si=to_si, from_si=1.0 / to_si, unit=unit)
-            raise BadInput(
-                f"{samples.name}: rates spread {ratio:.3g} times as widely as in the flights of the model, "
-                f"allowed: rates in rad/s; {text}"
+            raise refusal(
+                samples.name,
+                f"rates spread {ratio:.3g} times as widely as in the flights of the model",
+                f"rates in rad/s; {text}",
             )
 
 

@@ -9,13 +9,13 @@ from itertools import product
 import numpy as np
 from pydantic import ValidationError
 
-from beaver_ftc.documents import BadInput
 from beaver_ftc_logs import least_squares, regression
 from beaver_ftc_logs.fit_parts import Parts, usual_step_s
 from beaver_ftc_logs.groups import group_surfaces
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.noise_models import fit_noise_models
 from beaver_ftc_logs.recording import Floats, Ints
+from beaver_ftc_logs.refusals import refusal
 from beaver_ftc_logs.vehicle import Vehicle
 
 RATE_LAGS = (1, 2, 3, 4)  # values of h that are tried
@@ -92,11 +92,14 @@ def fit_order(parts: Parts, vehicle: Vehicle, h: int, L: int) -> least_squares.R
     coefficient of an axis, or if a rate does not move."""
     Z, y, stretch = stack_data(parts, vehicle, h, L)
     if len(y) < 10 * Z.shape[1]:
-        allowed = f"at least {10 * Z.shape[1]} to fit {Z.shape[1]} coefficients an axis"
-        raise BadInput(f"identify: {len(y)} samples known to be healthy, allowed: {allowed}")
+        raise refusal(
+            "identify",
+            f"{len(y)} samples known to be healthy",
+            f"at least {10 * Z.shape[1]} to fit {Z.shape[1]} coefficients an axis",
+        )
     still = [axis for axis, sd in zip("pqr", y.std(axis=0), strict=True) if sd < _MIN_RATE_SD]
     if still:
-        raise BadInput(f"identify: rate {still[0]} does not move, allowed: flights in which every rate does")
+        raise refusal("identify", f"rate {still[0]} does not move", "flights in which every rate does")
     return least_squares.fit_ols(Z, y, stretch, round(_NEWEY_WEST_S / usual_step_s(parts)))
 
 
@@ -146,7 +149,9 @@ def _model_of_fit(fit: least_squares.Regression, parts: Parts, vehicle: Vehicle,
             noise=fit.residual_covariance.tolist(),
         )
     except ValidationError as error:
-        reason = f"no model file can hold the {error.errors()[0]['loc'][0]} of this fit"
-        allowed = "three rates of which none follows from the others, commands as shares of travel"
-        raise BadInput(f"identify: {reason}, allowed: {allowed}") from None
+        raise refusal(
+            "identify",
+            f"no model file can hold the {error.errors()[0]['loc'][0]} of this fit",
+            "three rates of which none follows from the others, commands as shares of travel",
+        ) from None
     return model.model_copy(update={"colours": fit_noise_models(parts, model)})

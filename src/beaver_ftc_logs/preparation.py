@@ -10,13 +10,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from beaver_ftc.documents import BadInput
 from beaver_ftc_logs import orders
 from beaver_ftc_logs.fit_parts import fit_parts
 from beaver_ftc_logs.groups import group_surfaces
 from beaver_ftc_logs.least_squares import left_by
 from beaver_ftc_logs.loading import have_labels
 from beaver_ftc_logs.recording import Floats
+from beaver_ftc_logs.refusals import refusal
 from beaver_ftc_logs.samples import Samples, scale_by_airspeed
 from beaver_ftc_logs.vehicle import Vehicle
 from beaver_ftc_logs.whitening import NOISE_MA_CANDIDATES, whiten_samples
@@ -154,7 +154,7 @@ def whiten_flights(flights: Sequence[Samples], vehicle: Vehicle) -> list[Samples
         Z, y = stacked([whiten_samples(flight, ma)])
         if len(y) < 2:
             known = f"{len(y)} samples known to be healthy"
-            raise BadInput(f"identify: {flight.name}: {known}, allowed: at least 2")
+            raise refusal("identify", f"{flight.name}: {known}", "at least 2")
         return left_by(Z, y)
 
     whitened = []

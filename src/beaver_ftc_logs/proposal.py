@@ -12,7 +12,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document
 from beaver_ftc_logs import physics
 from beaver_ftc_logs.known_commands import command_names, missing_commands_text
@@ -39,6 +38,7 @@ from beaver_ftc_logs.recording import (
     largest_magnitude,
     nearest_names_text,
 )
+from beaver_ftc_logs.refusals import refusal
 from beaver_ftc_logs.rotorcraft import VTOL_MODE, hovers_throughout, multicopter_reason
 from beaver_ftc_logs.time_base import median_step_s
 from beaver_ftc_logs.unit_mistakes import FAST_RAD_S
@@ -199,7 +199,7 @@ def _find_time(path: Path) -> TimeSource | None:
     allowed = f"a table with {TIME_COLUMN} in seconds, or another time that increases"
     phrase = f" ({'; '.join(phrases)})" if phrases else ""
     nearest = nearest_names_text(TIME_COLUMN, names)
-    raise BadInput(f"{path}: no column of time{phrase}, allowed: {allowed}; it has {nearest}")
+    raise refusal(path, f"no column of time{phrase}", f"{allowed}; it has {nearest}")
 
 
 def _guess_angle_unit(name: str, roll: Column, reader: str) -> str:

@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document, Metrics, read_metrics
 from beaver_ftc.scenario import TIME_TOLERANCE_S
 from beaver_ftc.scenario.faults import of_a_sensor
 from beaver_ftc_logs.readers.table import check_time, read_numbers
 from beaver_ftc_logs.recording import Floats
+from beaver_ftc_logs.refusals import refusal
 
 
 def is_log_of_run(path: Path) -> bool:
@@ -37,7 +37,7 @@ def replay_run_log(path: Path) -> tuple[Document, Document]:
     names = ["t_s", *chain.from_iterable(groups)]
     log = read_numbers(path, [*names, "detected"])
     if missing := [name for name in names if name not in log]:
-        raise BadInput(f"{path}: no column {missing[0]}, allowed: a log.parquet as `run` writes it")
+        raise refusal(path, f"no column {missing[0]}", "a log.parquet as `run` writes it")
     check_time(path, log["t_s"])
     diagnosis = Diagnosis(aircraft, scenario.rate_hz, **stepped.error_sections(scenario))
     arrays = [np.column_stack([log[name] for name in group]) for group in groups]
@@ -96,7 +96,7 @@ def _is_as_flown(path: Path, *times_s: float | None) -> bool | None:
     try:
         metrics = Metrics.of(read_metrics(metrics_path))
     except (OSError, ValueError):
-        raise BadInput(f"{metrics_path}: cannot be read, allowed: the metrics.json of the flight") from None
+        raise refusal(metrics_path, "cannot be read", "the metrics.json of the flight") from None
     flown_s = metrics.detection.time_s, metrics.isolation.time_s
     return all(
         flown is now if flown is None or now is None else abs(flown - now) < TIME_TOLERANCE_S

@@ -7,6 +7,7 @@ import numpy as np
 from beaver_ftc.documents import BadInput
 from beaver_ftc_logs import signals
 from beaver_ftc_logs.recording import Column, Floats, Ints, Mask
+from beaver_ftc_logs.refusals import refusal
 from beaver_ftc_logs.runs import last_row_at
 from beaver_ftc_logs.units import TIME_UNITS
 
@@ -24,7 +25,7 @@ def sample_times(flight: str, stamps: Floats, max_hz: float) -> tuple[Floats, In
     stamps are too few, too slow or too fast.
     """
     if (n := len(stamps)) < _MIN_ROWS:
-        raise BadInput(f"{flight}: has {n} samples of the rates, allowed: at least {_MIN_ROWS}")
+        raise refusal(flight, f"has {n} samples of the rates", f"at least {_MIN_ROWS}")
     step_s = median_step_s(stamps)
     _refuse_rate(flight, 1.0 / step_s)
     if 1.0 / step_s <= _ALIKE_RATIO * max_hz:
@@ -32,9 +33,10 @@ def sample_times(flight: str, stamps: Floats, max_hz: float) -> tuple[Floats, In
     step_s = 1.0 / max_hz
     t_s, stretch = _even_times(stamps, step_s)
     if len(t_s) < _MIN_ROWS:
-        raise BadInput(
-            f"{flight}: {n} rows within {stamps[-1] - stamps[0]:.3g} s are {len(t_s)} samples at {max_hz:g} "
-            f"Hz, allowed: at least {_MIN_ROWS}; is time in another unit?"
+        raise refusal(
+            flight,
+            f"{n} rows within {stamps[-1] - stamps[0]:.3g} s are {len(t_s)} samples at {max_hz:g} Hz",
+            f"at least {_MIN_ROWS}; is time in another unit?",
         )
     return t_s, stretch, step_s
 

@@ -3,9 +3,9 @@ the vehicle file says, or the log is refused. `column_mistakes` compares the col
 
 import numpy as np
 
-from beaver_ftc.documents import BadInput
 from beaver_ftc_logs import signals, unit_mistakes
 from beaver_ftc_logs.recording import Columns, RecordedFlight, largest_magnitude
+from beaver_ftc_logs.refusals import refusal
 from beaver_ftc_logs.vehicle import Vehicle
 
 MAX_NUMBER = 1e6  # a larger number in a log is damaged
@@ -21,16 +21,17 @@ def refuse_unusable(log: RecordedFlight, vehicle: Vehicle) -> None:
     for name in vehicle.sampled_columns:
         values = log.columns[name].values
         if not np.isfinite(values).any():
-            raise BadInput(f"{log.name}: column {name} holds no number, allowed: a logged quantity")
+            raise refusal(log.name, f"column {name} holds no number", "a logged quantity")
         largest = largest_magnitude(values)
         if largest > MAX_NUMBER:
-            raise BadInput(f"{log.name}: column {name} holds {largest:g}, allowed: up to {MAX_NUMBER:g}")
+            raise refusal(log.name, f"column {name} holds {largest:g}", f"up to {MAX_NUMBER:g}")
         if name in vehicle.rate_columns and largest > _MAX_RATE_RAD_S:
             as_deg = np.deg2rad(largest)
             hint = f" (deg/s would be {as_deg:.3g} rad/s: `unit: deg/s`)" if as_deg < _MAX_RATE_RAD_S else ""
-            raise BadInput(
-                f"{log.name}: column {name} reaches {largest:g}, allowed: rates in rad/s, up to "
-                f"{_MAX_RATE_RAD_S:g}{hint}"
+            raise refusal(
+                log.name,
+                f"column {name} reaches {largest:g}",
+                f"rates in rad/s, up to {_MAX_RATE_RAD_S:g}{hint}",
             )
 
 
@@ -47,7 +48,7 @@ def confirm_rates(log: RecordedFlight, vehicle: Vehicle) -> frozenset[str]:
     if not mistake and acceleration and (az := columns.get(acceleration.column)):
         mistake = unit_mistakes.gravity_remark(az, acceleration.column)
     if mistake:
-        raise BadInput(f"{log.name}: {mistake}, allowed: what the vehicle file says, or its `unit` mended")
+        raise refusal(log.name, mistake, "what the vehicle file says, or its `unit` mended")
     return unit_mistakes.confirmed_rates(rates, angles)
 
 

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document
 from beaver_ftc_logs import extremes, trust
 from beaver_ftc_logs.bank import build_bank
@@ -18,6 +17,7 @@ from beaver_ftc_logs.noise_models import GAIN_SD_CAP
 from beaver_ftc_logs.orders import fit_of
 from beaver_ftc_logs.posterior_rows import NO_RESPONSE_LIMIT, rows_of_posterior
 from beaver_ftc_logs.recording import Floats
+from beaver_ftc_logs.refusals import refusal
 from beaver_ftc_logs.runs import runs_between
 from beaver_ftc_logs.scoring import score_against_labels
 
@@ -48,8 +48,11 @@ def add_ranges_and_threshold(parts: Parts, model: Model) -> Model:
     if tail is None and requested is not None:
         minutes = 60.0 * sum(hours for _, hours in peaks)
         reason = f"{minutes:.1f} min of health left out have too few peaks of the evidence to tell"
-        allowed = "more minutes of healthy flight, or no such rate"
-        raise BadInput(f"identify: false_alarms_per_hour {requested:g}: {reason}, allowed: {allowed}")
+        raise refusal(
+            "identify",
+            f"false_alarms_per_hour {requested:g}: {reason}",
+            "more minutes of healthy flight, or no such rate",
+        )
     rate = _DEFAULT_FALSE_ALARMS if requested is None and not model.settings.levels else requested
     threshold = _choose_threshold(tail, rate, model) if rate else None
     alarm = {"false_alarms_per_hour": rate, "threshold": threshold}

@@ -4,11 +4,11 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from beaver_ftc.documents import BadInput
 from beaver_ftc.documents import validate_model as validate
 from beaver_ftc.results import Document
 from beaver_ftc_logs.mixing import mixing_of_log
 from beaver_ftc_logs.readers import SELECTIVE_READERS, check_exists, read_flight, reader_name_for_path
+from beaver_ftc_logs.refusals import refusal
 from beaver_ftc_logs.vehicle import Vehicle, read_vehicle_document
 
 
@@ -27,9 +27,11 @@ def load_vehicle_for_logs(
         for log in logs:
             keys_of_log, lines_of_log = _missing_keys_of_log(log, reader, document.data, missing)
             if keys_of_first and keys_of_log != keys_of_first:
-                allowed = f"one for all, or {' and '.join(missing)} in {path}"
-                reason = f"its parameters give another mixing than those of {logs[0]}"
-                raise BadInput(f"{log}: {reason}, allowed: {allowed}")
+                raise refusal(
+                    log,
+                    f"its parameters give another mixing than those of {logs[0]}",
+                    f"one for all, or {' and '.join(missing)} in {path}",
+                )
             keys_of_first = keys_of_log
             lines = lines or [f"{log}: {line}" for line in lines_of_log]
         document.data.update(keys_of_first)
@@ -53,7 +55,7 @@ def _missing_keys_of_log(
     )
     mixing = mixing_of_log(used_reader, recording.parameters, column_names)
     if not mixing.surfaces:
-        raise BadInput(f"{log}: {'; '.join(mixing.lines)}, allowed: {' and '.join(missing)} in the file")
+        raise refusal(log, "; ".join(mixing.lines), f"{' and '.join(missing)} in the file")
     keys = {"commands": mixing.commands, "surfaces": mixing.surfaces}
     if columns_in_file is not None and "commands" in missing:
         keys["commands"] = [mixing.entry_by_column.get(column, column) for column in sorted(columns_in_file)]

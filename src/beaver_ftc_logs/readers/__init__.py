@@ -10,6 +10,7 @@ import numpy as np
 
 from beaver_ftc.documents import BadInput
 from beaver_ftc_logs.recording import Column, Floats, RecordedFlight, TimeSource, Wanted
+from beaver_ftc_logs.refusals import refusal
 
 # Number of rows in a part of a long table.
 ROWS_PER_PART = 100_000
@@ -83,7 +84,7 @@ def read_parts(
     check_exists(path)
     reader = reader or reader_name_for_path(path)
     if reader not in READERS:
-        raise BadInput(f"--reader {reader}: is not known, allowed: {', '.join(READERS)}")
+        raise refusal(f"--reader {reader}", "is not known", ", ".join(READERS))
     module = import_module(f"beaver_ftc_logs.readers.{reader}")
     own_time = READERS[reader].time
     if own_time is None:
@@ -129,7 +130,7 @@ def _select_period(column: Column, begin_s: float, end_s: float) -> Column:
 def check_exists(path: Path) -> None:
     """Raise BadInput if there is no log, or only a pointer to one (`check_is_log_itself`)."""
     if not path.exists():
-        raise BadInput(f"{path}: no such file or folder, allowed: a recorded flight")
+        raise refusal(path, "no such file or folder", "a recorded flight")
     check_is_log_itself(path)
 
 
@@ -142,9 +143,10 @@ def check_is_log_itself(path: Path) -> None:
         head = file.read(_POINTER_BYTES)
     for pattern, (store, command) in _LARGE_FILE_STORES.items():
         if re.match(pattern, head):
-            allowed = f"the log itself, which `{command}` fetches"
-            raise BadInput(
-                f"{path}: is a pointer of a large-file store ({store}), not the log, allowed: {allowed}"
+            raise refusal(
+                path,
+                f"is a pointer of a large-file store ({store}), not the log",
+                f"the log itself, which `{command}` fetches",
             )
 
 
@@ -156,6 +158,9 @@ def reader_name_for_path(path: Path) -> str:
         raise BadInput(f"{path}: is {_WAYS_TO_TABLE[path.suffix.lower()]}")
     name = _READER_OF_SUFFIX.get(path.suffix.lower())
     if name is None:
-        allowed = f"{', '.join(sorted(_READER_OF_SUFFIX))}, or --reader {', '.join(READERS)}"
-        raise BadInput(f"{path}: what kind of log this is cannot be seen, allowed: {allowed}")
+        raise refusal(
+            path,
+            "what kind of log this is cannot be seen",
+            f"{', '.join(sorted(_READER_OF_SUFFIX))}, or --reader {', '.join(READERS)}",
+        )
     return name

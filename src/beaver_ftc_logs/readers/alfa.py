@@ -16,10 +16,10 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.documents import BadInput
 from beaver_ftc_logs.readers.table import read_numbers
 from beaver_ftc_logs.readers.topics import rows_with_increasing_time
 from beaver_ftc_logs.recording import Column, Columns, Floats, Ints, LoggedFailure, RecordedFlight
+from beaver_ftc_logs.refusals import refusal
 from beaver_ftc_logs.time_base import latest_values
 from beaver_ftc_logs.units import HALF_PULSE_RANGE_US, NEUTRAL_PULSE_US
 
@@ -54,10 +54,10 @@ def read(path: Path, _wanted: Any = None) -> RecordedFlight:
     _wanted: every reader receives the columns that are wanted; this one reads all of its few topics.
     """
     if not path.is_dir():
-        raise BadInput(f"{path}: is a file, allowed: a folder of the ALFA data set's processed CSV files")
+        raise refusal(path, "is a file", "a folder of the ALFA data set's processed CSV files")
     tables = dict(_read_topic_tables(path))
     if _GYRO_TOPIC not in tables:
-        raise BadInput(f"{path}: no {_GYRO_TOPIC} topic, allowed: a processed folder of the ALFA data set")
+        raise refusal(path, f"no {_GYRO_TOPIC} topic", "a processed folder of the ALFA data set")
     kept = {topic: rows_with_increasing_time(topic, table[_TIME_FIELD]) for topic, table in tables.items()}
     zero_ns = float(tables[_GYRO_TOPIC][_TIME_FIELD][kept[_GYRO_TOPIC][0][0]])
     columns = dict(_read_columns(tables, kept, zero_ns))

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.documents import BadInput
-from beaver_ftc_logs.readers.topics import Topic, columns_of_topics, package_errors_as_bad_input
+from beaver_ftc_logs.readers.topics import Topic, flight_of_topics, package_errors_as_bad_input
 from beaver_ftc_logs.recording import Parameters, RecordedFlight, Wanted, add_parameter
 
 _TIME_FIELD = "TimeUS"
@@ -47,8 +47,7 @@ def read(path: Path, wanted: Wanted = None) -> RecordedFlight:
         if not topics:
             reason = "holds no message with a time stamp, allowed: a dataflash log of a flight"
             raise BadInput(f"{path}: {reason}")
-        columns, names, _ = columns_of_topics(topics, wanted, topics)
-    return RecordedFlight(path.stem, columns, parameters=params, unread_column_names=names)
+        return flight_of_topics(path, topics, wanted, topics, params)[0]
 
 
 def _topics_of_instances(name: str, messages: Any) -> Iterator[tuple[str, Topic]]:

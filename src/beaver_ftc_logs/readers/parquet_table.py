@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.documents import BadInput
 from beaver_ftc_logs.readers.text import TableCells
+from beaver_ftc_logs.refusals import refusal
 
 _BYTES_PER_NUMBER = 8
 # Largest number of rows, 2.8 h at 1000 Hz, and of bytes of numbers in memory.
@@ -69,11 +69,10 @@ def _check_parquet_size(path: Path, metadata: Any, names: Sequence[str]) -> None
     few bytes of a file may stand for billions of rows.
     """
     if metadata.num_rows > MAX_ROWS:
-        raise BadInput(f"{path}: has {metadata.num_rows:,} rows, allowed: up to {MAX_ROWS:,}")
+        raise refusal(path, f"has {metadata.num_rows:,} rows", f"up to {MAX_ROWS:,}")
     groups = [metadata.row_group(i) for i in range(metadata.num_row_groups)]
     chunks = [group.column(i) for group in groups for i in range(group.num_columns)]
     total = sum(chunk.total_uncompressed_size for chunk in chunks if chunk.path_in_schema in names)
     size = max(total, _BYTES_PER_NUMBER * metadata.num_rows * len(names))
     if size > _MAX_NUMBER_BYTES:
-        allowed = f"up to {_MAX_NUMBER_BYTES / 1e9:g} GB"
-        raise BadInput(f"{path}: holds {size / 1e9:,.1f} GB of numbers, allowed: {allowed}")
+        raise refusal(path, f"holds {size / 1e9:,.1f} GB of numbers", f"up to {_MAX_NUMBER_BYTES / 1e9:g} GB")

@@ -13,6 +13,7 @@ from beaver_ftc_logs.readers import LAST_PART_FACTOR, PART_OVERLAP_SHARE, check_
 from beaver_ftc_logs.readers.parquet_table import BATCH_ROWS, MAX_ROWS, ParquetTable
 from beaver_ftc_logs.readers.text import TableCells, TextTable, join_blocks, unreadable_error
 from beaver_ftc_logs.recording import Column, Floats, RecordedFlight, TimeSource, Wanted, nearest_names_text
+from beaver_ftc_logs.refusals import refusal
 from beaver_ftc_logs.units import TIME_UNITS
 
 TIME_COLUMN = "t_s"
@@ -40,7 +41,7 @@ def read_parts(
     if name not in table.names:
         allowed = f"a table with {TIME_COLUMN} in seconds, or its `time` in the vehicle file"
         nearest = nearest_names_text(name, table.names)
-        raise BadInput(f"{path}: no column {name}, allowed: {allowed}; it has {nearest}")
+        raise refusal(path, f"no column {name}", f"{allowed}; it has {nearest}")
     for part, (cells, has_more) in enumerate(parts, 1):
         numbers = table.whole(cells)
         t_s = numbers.pop(name) * TIME_UNITS[unit]
@@ -61,7 +62,7 @@ def _timed_rows(path: Path, time: str, t_s: Floats, cells: TableCells) -> tuple[
         return slice(None), []
     if n_bad > len(t_s) // 2:
         reason = f"{n_bad} of {len(t_s)} rows hold no number{text_of_column_phrase(cells, time)}"
-        raise BadInput(f"{path}: {time}: {reason}, allowed: increasing time")
+        raise refusal(path, f"{time}: {reason}", "increasing time")
     return np.isfinite(t_s), [f"{time}: rows without a number, left out: {n_bad} of {len(t_s)}"]
 
 
@@ -93,11 +94,11 @@ def check_time(path: Path, t_s: Floats, time: str = TIME_COLUMN, n_rows_before: 
     """Raise BadInput unless the stamps are finite and increase. n_rows_before: rows of the table before the
     first."""
     if len(t_s) < 2:
-        raise BadInput(f"{path}: has {len(t_s)} rows, allowed: at least 2")
+        raise refusal(path, f"has {len(t_s)} rows", "at least 2")
     wrong = np.flatnonzero(~np.isfinite(t_s) | (np.diff(t_s, prepend=-np.inf) <= 0))
     if wrong.size:
         row = n_rows_before + int(wrong[0]) + 1
-        raise BadInput(f"{path}: {time}: row {row}: time does not increase, allowed: increasing seconds")
+        raise refusal(path, f"{time}: row {row}: time does not increase", "increasing seconds")
 
 
 @contextmanager
@@ -133,7 +134,7 @@ class _Table:
         doubled = self._file_table.doubled_names
         ambiguous = sorted(name for name in doubled if columns is not None and name in columns)
         if ambiguous:
-            raise BadInput(f"{self._path}: has two columns {ambiguous[0]}, allowed: one of a name")
+            raise refusal(self._path, f"has two columns {ambiguous[0]}", "one of a name")
         readable = [name for name in self._file_table.readable_names if name not in doubled]
         wanted = [name for name in readable if columns is None or name in columns]
         return self._join_blocks(self._file_table.blocks(self._path, wanted), part_rows)

@@ -7,12 +7,13 @@ from contextlib import contextmanager, redirect_stdout
 from dataclasses import dataclass
 from io import StringIO
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from beaver_ftc.documents import BadInput
-from beaver_ftc_logs.recording import Column, Columns, Floats, Ints, Wanted
+from beaver_ftc_logs.recording import Column, Floats, Ints, Parameters, RecordedFlight, Wanted
+from beaver_ftc_logs.refusals import refusal
 
 _S_PER_US = 1e-6
 
@@ -38,9 +39,7 @@ def package_errors_as_bad_input(
         raise
     except Exception as error:  # these packages raise errors of any type for a damaged file
         reason = " ".join(str(error).split()) or type(error).__name__
-        raise BadInput(
-            f"{path}: is no {log_kind} that can be read ({reason}), allowed: {valid_log_file_text}"
-        ) from None
+        raise refusal(path, f"is no {log_kind} that can be read ({reason})", valid_log_file_text) from None
 
 
 @dataclass(frozen=True)
@@ -60,44 +59,39 @@ def names_of_topics(topics: Mapping[str, Topic]) -> tuple[str, ...]:
     return tuple(f"{name}.{field}" for name, topic in topics.items() for field in topic.fields)
 
 
-class TopicColumns(NamedTuple):
-    """The columns of a log by name; the names of all its columns; and the stamp, s, from which the times
-    count, None if no row has one.
-    """
-
-    columns: Columns
-    all_names: tuple[str, ...]
-    origin_s: float | None
-
-
-def columns_of_topics(
-    topics: Mapping[str, Topic], wanted: Wanted, all_topics: Mapping[str, Topic]
-) -> TopicColumns:
-    """The columns `topic.field` of a log: those of the wanted names, all of `topics` if wanted is None.
+def flight_of_topics(
+    path: Path,
+    topics: Mapping[str, Topic],
+    wanted: Wanted,
+    all_topics: Mapping[str, Topic],
+    params: Parameters,
+) -> tuple[RecordedFlight, float | None]:
+    """The flight with the columns `topic.field` of a log: those of the wanted names, all of `topics` if
+    wanted is None; and the stamp, s, from which its times count, None if no row has one.
 
     topics: the topics that were read, those of the wanted columns among them. all_topics: topics whose names
-    are returned. It is `topics` itself if they have every wanted column. If one is missing, it is all topics
-    of the log, whose names the message about the missing column lists.
+    the flight has as names of all columns. It is `topics` itself if they have every wanted column. If one is
+    missing, it is all topics of the log, whose names the message about the missing column lists.
 
     The origin of the times is the earliest stamp of `topics`. If all_topics has none of the wanted names, the
     columns are all of its names, without rows.
     """
     names = names_of_topics(all_topics)
+    flight = RecordedFlight(path.stem, {}, parameters=params, unread_column_names=names)
     if wanted is not None and not {*wanted} & {*names}:
-        return TopicColumns(dict.fromkeys(names, Column(np.empty(0), np.empty(0))), names, None)
+        flight.columns.update(dict.fromkeys(names, Column(np.empty(0), np.empty(0))))
+        return flight, None
     kept = {name: rows_with_increasing_time(name, topic.stamps_us) for name, topic in topics.items()}
     first_us = [topics[name].stamps_us[rows[0]] for name, (rows, _) in kept.items() if len(rows)]
     origin_us = min(first_us, default=0.0)
-    origin_s = float(origin_us * _S_PER_US) if first_us else None
-    columns: Columns = {}
     for name, topic in topics.items():
         rows, note = kept[name]
         t_s = (topic.stamps_us[rows] - origin_us) * _S_PER_US
         for field_name in topic.fields:
             if wanted is None or f"{name}.{field_name}" in wanted:
                 values = np.asarray(topic.values(field_name)[rows], dtype=float)
-                columns[f"{name}.{field_name}"] = Column(t_s, values, note)
-    return TopicColumns(columns, names, origin_s)
+                flight.columns[f"{name}.{field_name}"] = Column(t_s, values, note)
+    return flight, float(origin_us * _S_PER_US) if first_us else None
 
 
 def rows_with_increasing_time(topic: str, stamps: Floats) -> tuple[Ints, str]:

@@ -4,17 +4,18 @@ Time counts from the first message of the topics that are read. Reading needs py
 """
 
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from beaver_ftc.documents import BadInput
 from beaver_ftc_logs.readers.topics import (
     Topic,
-    columns_of_topics,
+    flight_of_topics,
     names_of_topics,
     package_errors_as_bad_input,
 )
 from beaver_ftc_logs.recording import Parameters, RecordedFlight, Wanted, add_parameter
+from beaver_ftc_logs.refusals import refusal
 
 _TIME_FIELD = "timestamp"
 # Largest number of bytes of a message: its length is written in 16 bits.
@@ -34,10 +35,11 @@ def read(path: Path, wanted: Wanted = None) -> RecordedFlight:
         if wanted is not None and not {*wanted} <= {*names_of_topics(topics)}:
             all_topics = _read_topics(path, None, {})
         if not all_topics:
-            raise BadInput(f"{path}: holds no message, allowed: a log of a flight")
-        columns, names, origin_s = columns_of_topics(topics, wanted, all_topics)
-    notes = () if origin_s is None else (f"time counts from {origin_s:.3f} s of the autopilot's clock",)
-    return RecordedFlight(path.stem, columns, notes=notes, parameters=params, unread_column_names=names)
+            raise refusal(path, "holds no message", "a log of a flight")
+        flight, origin_s = flight_of_topics(path, topics, wanted, all_topics, params)
+    if origin_s is None:
+        return flight
+    return replace(flight, notes=(f"time counts from {origin_s:.3f} s of the autopilot's clock",))
 
 
 def _read_topics(path: Path, wanted: Wanted, params: Parameters) -> dict[str, Topic]:

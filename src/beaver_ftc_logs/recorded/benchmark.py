@@ -13,7 +13,6 @@ from pathlib import Path
 
 import numpy as np
 
-from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document
 from beaver_ftc.studies.engine import poisson
 from beaver_ftc_logs import scoring
@@ -26,6 +25,7 @@ from beaver_ftc_logs.loading import read_vehicle_columns
 from beaver_ftc_logs.log_rows import LogRows
 from beaver_ftc_logs.model import FilterSettings, Model
 from beaver_ftc_logs.recording import RecordedFlight
+from beaver_ftc_logs.refusals import refusal
 from beaver_ftc_logs.samples import Samples, resample
 from beaver_ftc_logs.validation import add_ranges_and_threshold, score_folds
 from beaver_ftc_logs.vehicle import Vehicle, load_vehicle
@@ -62,11 +62,14 @@ class DataSet:
 def load_data_sets(folder: Path) -> list[DataSet]:
     """The data sets below a folder. Raises BadInput where there is none, or a flight cannot be used."""
     if not folder.is_dir():
-        raise BadInput(f"compare: --flights {folder}: no such folder, allowed: a folder of recorded flights")
+        raise refusal("compare", f"--flights {folder}: no such folder", "a folder of recorded flights")
     data_sets = [data for path in (folder, *sorted(folder.iterdir())) if (data := _load_data_set(path))]
     if not data_sets:
-        allowed = f"folders with tables and a {VEHICLE_FILE}, or with processed folders of the ALFA data set"
-        raise BadInput(f"compare: --flights {folder}: holds no data set, allowed: {allowed}")
+        raise refusal(
+            "compare",
+            f"--flights {folder}: holds no data set",
+            f"folders with tables and a {VEHICLE_FILE}, or with processed folders of the ALFA data set",
+        )
     return data_sets
 
 

@@ -13,7 +13,6 @@ from pathlib import Path
 
 import numpy as np
 
-from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document
 from beaver_ftc_logs import scoring
 from beaver_ftc_logs.detectors import OUR_DETECTOR, diagnose_with_detector
@@ -23,6 +22,7 @@ from beaver_ftc_logs.folds import validation_folds
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recorded import benchmark
 from beaver_ftc_logs.recording import Floats
+from beaver_ftc_logs.refusals import refusal
 from beaver_ftc_logs.samples import Samples, mixer_matrix
 
 TUNING_SEEDS = range(8)
@@ -49,9 +49,9 @@ class DayChanges:
     """
 
     name: str
-    trim_shift_commands: Floats
-    neutral_shift_commands: Floats
-    surface_gains: Floats
+    trim_shift_commands: Floats | float = 0.0
+    neutral_shift_commands: Floats | float = 0.0
+    surface_gains: Floats | float = 1.0
     common_gain: float = 1.0
     command_delay_s: float = 0.0
     motion_scale: float = 1.0
@@ -62,26 +62,21 @@ class DayChanges:
 def one_change_days(mixer: Floats, commands: list[str]) -> list[DayChanges]:
     """The recorded day, and days on which one thing is changed. mixer (S, C): share of each command in each
     surface."""
-    n = len(mixer)
-    unchanged = DayChanges("as it was", np.zeros(n), np.zeros(n), np.ones(n))
-    days = [unchanged]
+    days = [DayChanges("as it was")]
     for command, shares in zip(commands, mixer.T, strict=True):
         for shift in (-0.04, 0.04):
-            shift_of_surfaces = shift * shares
             name = f"of {command} {shift:+.2f}"
-            days.append(replace(unchanged, name=f"trim {name}", trim_shift_commands=shift_of_surfaces))
-            days.append(replace(unchanged, name=f"neutral {name}", neutral_shift_commands=shift_of_surfaces))
-    days += [replace(unchanged, name=f"gain {gain:.2f}", common_gain=gain) for gain in (0.85, 1.15)]
-    days += [
-        replace(unchanged, name=f"commands {delay:+.2f} s", command_delay_s=delay) for delay in (-0.04, 0.04)
-    ]
-    days += [replace(unchanged, name=f"excitation {scale:.1f}", motion_scale=scale) for scale in (0.6, 1.5)]
-    days.append(replace(unchanged, name="noise 1.5", noise_ratio=1.5))
-    days.append(replace(unchanged, name="trim drifts", trim_drift_sd_commands=0.01))
-    for i, unit in enumerate(np.eye(n)):
+            days.append(DayChanges(f"trim {name}", trim_shift_commands=shift * shares))
+            days.append(DayChanges(f"neutral {name}", neutral_shift_commands=shift * shares))
+    days += [DayChanges(f"gain {gain:.2f}", common_gain=gain) for gain in (0.85, 1.15)]
+    days += [DayChanges(f"commands {delay:+.2f} s", command_delay_s=delay) for delay in (-0.04, 0.04)]
+    days += [DayChanges(f"excitation {scale:.1f}", motion_scale=scale) for scale in (0.6, 1.5)]
+    days.append(DayChanges("noise 1.5", noise_ratio=1.5))
+    days.append(DayChanges("trim drifts", trim_drift_sd_commands=0.01))
+    for i, unit in enumerate(np.eye(len(mixer))):
         for gain in (0.94, 1.06):
-            gains = np.where(unit, gain, 1.0)
-            days.append(replace(unchanged, name=f"surface {i + 1} by {gain:.2f}", surface_gains=gains))
+            name = f"surface {i + 1} by {gain:.2f}"
+            days.append(DayChanges(name, surface_gains=np.where(unit, gain, 1.0)))
     return days
 
 
@@ -175,7 +170,7 @@ def run_other_days(folder: Path) -> Document:
     all_sets = benchmark.load_data_sets(folder)
     labelled = [data for data in all_sets if np.isfinite(data.flights[0].labels).any()]
     if not labelled:
-        raise BadInput(f"compare: --other-days: {folder} holds no labelled flight, allowed: one with labels")
+        raise refusal("compare", f"--other-days: {folder} holds no labelled flight", "one with labels")
     return {"sets": [_test_data_set(data) for data in labelled]}
 
 

@@ -13,11 +13,11 @@ import numpy as np
 from beaver_ftc.documents import BadInput
 from beaver_ftc_logs import column_mistakes, energy, trust
 from beaver_ftc_logs.bank import build_bank
-from beaver_ftc_logs.filtering import bank_posterior
 from beaver_ftc_logs.groups import expand_groups
 from beaver_ftc_logs.log_rows import LogRows, at_log_stamps
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.motion_units import refuse_rate_unit
+from beaver_ftc_logs.posterior import bank_posterior
 from beaver_ftc_logs.posterior_rows import NO_RESPONSE_LIMIT, rows_of_posterior
 from beaver_ftc_logs.recording import Mask
 from beaver_ftc_logs.refusals import refusal

@@ -1,4 +1,4 @@
-"""The bank of filters: one causal pass through a flight, with all hypotheses in parallel.
+"""The kernels of the bank of filters: one causal pass through a flight, with all hypotheses in parallel.
 
 Under hypothesis h, with effectiveness a_h of the groups, the part of the rates unexplained by the past is
 
@@ -26,177 +26,19 @@ changes the motion about the trim, as the dynamic pressure does, and not the tri
 another at random times (interacting multiple models [Blom1988]). The new one takes over trim and gains, plus
 an offset of the rates if a surface may be stuck. The last hypothesis is that nothing answers the commands, as
 on the ground: it estimates no trim and no gain.
-
-The pass is repeated for each noise model, or else for each delay of the commands that the flight may have.
-The results are averaged with the probabilities of these alternatives (`bank_posterior`).
 """
-
-from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc_logs.bank import HypothesisBank, build_noise, build_states
-from beaver_ftc_logs.model import Model
-from beaver_ftc_logs.recording import Floats
-from beaver_ftc_logs.regression import Innovations, by_noise, innovations
-from beaver_ftc_logs.runs import trailing_sums
-from beaver_ftc_logs.samples import Samples
+from beaver_ftc_logs.bank import MIN_PROBABILITY
 
-_EVIDENCE_MEMORY_S = 600.0  # memory of the comparison of delays or noise models
-# Least probability of a hypothesis; also the rounding error of a sum of probabilities.
-_MIN_PROBABILITY = 1e-15
 _MIN_NOISE_SCALE = 0.3  # limits of the running scale r
 _MAX_NOISE_SCALE = 6.0
 _SQUARE_CLIP = 3.0  # limit of d2 per axis in the running scale
-_SUM_SPANS_S = (0.0, 0.1)  # `recent_scale` sums the residual over each of these; 0: a single sample
-_VARIANCE_WINDOW_S = 2.0  # `recent_scale` takes the variance of the sums over the last 2 s
 # Mean of the clipped d2 per axis if the running scale is right: between 0.91, of a t distribution with 8
 # degrees of freedom and the covariance S, and 0.98, of a normal one.
 _MEAN_SQUARE = 0.93
-# Probability of a noise model below which a sample leaves it out.
-_MIN_NOISE_WEIGHT = 1e-3
-
-# The two results of `run_bank`: probabilities (n, H) and log likelihoods (n,).
-BankRun = tuple[Floats, Floats]
-
-
-def bank_posterior(samples: Samples, model: Model, bank: HypothesisBank) -> Floats:
-    """Probability of each hypothesis by sample, (n, H).
-
-    It is a weighted average of several runs of the bank. If the model has noise models (`colours`) and the
-    flight is not yet whitened, there is a run for each noise model, otherwise for each command delay of the
-    settings. The weights are the probabilities of the runs given the last minutes (`model_weights`): of a
-    delay by the likelihood of its run, of a noise model by that of a healthy flight (`_noise_likelihood`). A
-    noise model is run only up to the last sample at which its weight is at least _MIN_NOISE_WEIGHT: within a
-    second most become far less likely than another.
-    """
-    if not model.colours or samples.noise_ma_coefficients:
-        delays = model.settings.delays_s
-        flights = [innovations(_with_command_delay(samples, delay_s), model) for delay_s in delays]
-        runs = [run_flight(flight, model, bank) for flight in flights]
-        weights = model_weights([ll for _, ll in runs], model.rate_hz)
-        return (weights[:, :, None] * np.array([p for p, _ in runs])).sum(axis=0)
-    pairs = [(innovations(white, own_model), own_model) for white, own_model in by_noise(samples, model)]
-    weights = model_weights([_noise_likelihood(*pair) for pair in pairs], model.rate_hz)
-    kept = np.where(weights < _MIN_NOISE_WEIGHT, 0.0, weights)
-    kept /= kept.sum(axis=0)
-    mean = np.zeros((len(samples.t_s), len(bank.transition_share)))
-    for w, (flight, own_model) in zip(kept, pairs, strict=True):
-        if n := int(np.flatnonzero(w).max(initial=-1)) + 1:
-            p, _ = run_flight(flight.at(slice(n)), own_model, bank)
-            mean[:n] += w[:n, None] * p
-    return mean
-
-
-def _noise_likelihood(flight: Innovations, model: Model) -> Floats:
-    """Log likelihood of each sample (n,), but for a constant, if all surfaces are healthy, for a flight that
-    is whitened by the model's noise; 0 where the sample is not known:
-
-        -power ((nu + 3) log(1 + d2 / nu) + 3 log q + log det R) / 2 + power 3 log sum(ma),   d2 = |e W|^2 / q
-
-    R: covariance of the noise in the fit, without its inflation. ma: moving average of the noise.
-    """
-    q = flight.quick_scale(model)
-    d2 = ((flight.e @ flight.W) ** 2).sum(axis=1) / q
-    nu = model.settings.tail
-    ll = -0.5 * ((nu + 3.0) * np.log1p(d2 / nu) + 3.0 * np.log(q)) - flight.log_size
-    return np.where(flight.is_known, model.settings.power * ll, 0.0)
-
-
-def fault_evidence(p: Floats, bank: HypothesisBank) -> Floats:
-    """Increase of the log odds of a fault by each sample, (n,), from the probabilities p (n, H):
-
-        z[k] = log odds(f[k]) - log odds((1 - change) f[k-1] + entry)
-
-    f: probability of a loss of effectiveness (`is_fault_hypothesis`: not of an unknown offset), at least
-    _MIN_PROBABILITY from 0 and 1; change: probability that the hypothesis changes within a sample; entry: the
-    probability of a change to a fault. Before the first sample, the prior probability of a fault is used. The
-    sum of z is the logarithm of a likelihood ratio.
-    """
-    is_fault = bank.is_fault_hypothesis
-    share = bank.transition_share
-    change = bank.change_probability_per_sample
-    fault = np.clip(p[:, is_fault].sum(axis=1), _MIN_PROBABILITY, 1.0 - _MIN_PROBABILITY)
-    entry = change * share[is_fault].sum() / share.sum()
-    prior = np.append(bank.prior_probability[is_fault].sum(), (1.0 - change) * fault[:-1] + entry)
-    return np.log(fault / (1.0 - fault)) - np.log(prior / (1.0 - prior))
-
-
-@kernel(allocates=True)
-def page_cusum(z, top):
-    """Page's sum of the evidence z (n,), between 0 and top:
-
-    sums[k] = min(max(sums[k-1] + z[k], 0), top)
-    """
-    page = 0.0
-    sums = np.zeros(len(z))
-    for k in range(len(z)):
-        page = min(max(page + z[k], 0.0), top)
-        sums[k] = page
-    return sums
-
-
-def _with_command_delay(samples: Samples, delay_s: float) -> Samples:
-    """The flight with commands that act delay_s later than in the model. A negative delay acts earlier; the
-    magnitude counts up to one sample.
-
-    A delayed command is interpolated between two samples. The model uses commands from one sample before the
-    rates, so a negative delay needs no later command than that of the same sample.
-    """
-    if delay_s == 0.0:
-        return samples
-    share = min(abs(delay_s) / samples.dt_s, 1.0)
-    u = samples.commands
-    neighbour = np.vstack([u[:1], u[:-1]] if delay_s > 0 else [u[1:], u[-1:]])
-    return replace(samples, commands=(1.0 - share) * u + share * neighbour)
-
-
-def model_weights(ll: Sequence[Floats], rate_hz: float) -> Floats:
-    """Probability of each of J alternative models at each sample, (J, n), from their log likelihoods ll, (n,)
-    each. Older samples are forgotten exponentially, with the time constant _EVIDENCE_MEMORY_S."""
-    from scipy.signal import lfilter
-
-    pole = np.exp(-1.0 / (_EVIDENCE_MEMORY_S * rate_hz))
-    sums = lfilter([1.0], [1.0, -pole], np.array(ll), axis=1)
-    p = np.exp(sums - sums.max(axis=0))
-    return p / p.sum(axis=0)
-
-
-def run_flight(flight: Innovations, model: Model, bank: HypothesisBank) -> BankRun:
-    """The result of `run_bank` for one flight. Under other laws, the scale of the noise has the lower bound
-    of `recent_scale`."""
-    q = flight.quick_scale(model)
-    r_min = np.zeros(len(q))
-    if model.vehicle.other_laws:
-        white = flight.e @ flight.W / np.sqrt(flight.noise.wider * q[:, None])
-        r_min = recent_scale(white, flight.is_known, model.rate_hz)
-    states = build_states(model, flight.noise)
-    noise = build_noise(model, flight.noise, flight.c)
-    run: BankRun = run_bank(flight.y, flight.F, flight.is_known, bank, states, noise, r_min, q)
-    return run
-
-
-def recent_scale(g: Floats, ok: np.ndarray, rate_hz: float) -> Floats:
-    """Variance of a flight's residual over the last _VARIANCE_WINDOW_S, over that of the noise, (n,):
-
-        max over the spans of the mean of |sum of g over the span|^2 / (3 number of ok samples in the span)
-
-    g (n, 3): residual in standard deviations of the noise, 0 where a sample is not ok (n,). The mean is over
-    the rows of the window whose span has an ok sample; 0 without such a row.
-
-    Air, gyros or a law that no fitted flight had leave a larger residual, and evidence must then count less
-    at once. A fault leaves a larger residual, too; the right hypothesis explains it.
-    """
-    ratio = np.zeros(len(g))
-    for span_s in _SUM_SPANS_S:
-        sums, _ = trailing_sums(np.column_stack([g, ok]), span_s * rate_hz)
-        n_ok = sums[:, 3]
-        squares = (sums[:, :3] ** 2).sum(axis=1) / (3.0 * np.maximum(n_ok, 1.0))
-        totals, _ = trailing_sums(np.column_stack([squares, n_ok > 0.0]), _VARIANCE_WINDOW_S * rate_hz)
-        ratio = np.maximum(ratio, totals[:, 0] / np.maximum(totals[:, 1], 1.0))
-    return ratio
 
 
 @kernel(allocates=True)
@@ -204,8 +46,9 @@ def run_bank(y, F, ok, bank, states, noise, r_min, q):
     """Posterior probabilities (n, H), and the log likelihood of each sample given all before it, but for a
     constant, (n,): log sum_h prior_h exp(ll_h), as in `_correct`; 0 for a sample that is not used.
 
-    ok (n,): whether the sample may be used. bank: HypothesisBank, states: StateModel, noise: ResidualNoise,
-    as in `bank`; r_min (n,): lower bound of the scale of the noise; q (n,). After each sample that is used
+    ok (n,): whether the sample may be used. bank: HypothesisBank of `bank`; states: StateModel, noise:
+    ResidualNoise, both of `flight_states`; r_min (n,): lower bound of the scale of the noise; q (n,). After
+    each sample that is used
 
         r <- r exp((1 - p_none) (d2 / 3 - _MEAN_SQUARE) / scale_memory_samples)
 
@@ -319,7 +162,7 @@ def _correct(prior, x, P, y, F, bank, noise, scale):
         log_t = -0.5 * (nu + 3.0) * np.log(1.0 + min(d2[h], noise.max_squared_residual) / nu)
         ll[h] = noise.effective_sample_share * (log_t - 0.5 * log_det)
     top = ll.max()
-    p = np.maximum(prior * np.exp(ll - top), _MIN_PROBABILITY)
+    p = np.maximum(prior * np.exp(ll - top), MIN_PROBABILITY)
     total = p.sum()
     p /= total
     mean = p @ np.minimum(noise.covariance_inflation * d2, 3.0 * _SQUARE_CLIP)

@@ -7,15 +7,18 @@ G               number of groups of surfaces
 known           whether the effect of each group is known (G,)
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from beaver_ftc_logs import regression, trust
-from beaver_ftc_logs.bank import build_states
-from beaver_ftc_logs.effect_errors import RANK_TOLERANCE
+from beaver_ftc_logs.effect_errors import RANK_TOLERANCE, group_gain_sd
 from beaver_ftc_logs.fit_parts import Parts
+from beaver_ftc_logs.flight_states import build_states
 from beaver_ftc_logs.folds import Fold, held_out_folds
 from beaver_ftc_logs.model import Model
-from beaver_ftc_logs.noise_models import centred
+from beaver_ftc_logs.noise_models import GAIN_SD_CAP, centred
+from beaver_ftc_logs.orders import fit_of
 from beaver_ftc_logs.recording import Floats
 
 
@@ -70,7 +73,25 @@ def gain_errors(fold: Fold, window_s: float | None = None, loudness: float = 1.0
     return errors
 
 
-def squared_deviations(fold: Fold) -> Floats:
+def gain_sd_with_deviations(parts: Parts, model: Model, folds: Sequence[Fold]) -> Floats:
+    """Standard error of the gain of each group, sd (G,), of a gain that is 1 in the model:
+
+        sd = min(sqrt(s^2 + d^2), GAIN_SD_CAP)
+        d^2 = mean over k = 0 to K of d_k^2, 0 without other laws
+
+    s: standard error of the fit. d_1 to d_K: deviations of the gain from 1 in each of several flights left
+    out. d_0: the largest error by which the fit may misread the gain, sqrt(3) times its standard deviation
+    under the noise model with the largest.
+    """
+    variance = group_gain_sd(fit_of(parts, model), model) ** 2
+    if model.vehicle.other_laws:
+        misreads = [noise.misreads for noise in model.colours] or [[0.0] * len(model.groups)]
+        deviations = [_squared_deviations(fold) for fold in folds] if len(parts) > 1 else []
+        variance += np.nanmean([3.0 * np.max(misreads, axis=0) ** 2, *deviations], axis=0)
+    return np.minimum(np.sqrt(variance), GAIN_SD_CAP)
+
+
+def _squared_deviations(fold: Fold) -> Floats:
     """Squared error of the gain of each group in a flight left out, less the part that the noise causes, at
     least 0, (G,); nan for a group whose effect is unknown or that the flight does not show."""
     F, e = standardized(fold.model, fold.innovations())

@@ -15,7 +15,8 @@ from beaver_ftc_logs.groups import group_indices
 from beaver_ftc_logs.model import Model, NoiseModel
 from beaver_ftc_logs.motion_units import refuse_command_unit
 from beaver_ftc_logs.noise_models import AR_ORDER
-from beaver_ftc_logs.preparation import assume_law_and_air, whiten_flights
+from beaver_ftc_logs.noise_search import whiten_flights
+from beaver_ftc_logs.preparation import assume_law_and_air
 from beaver_ftc_logs.samples import Samples
 from beaver_ftc_logs.vehicle import Vehicle
 from beaver_ftc_logs.whitening import UNFITTED_GYROS_RAD_S, UNFITTED_MA, whiten_samples

@@ -4,12 +4,12 @@ from collections import defaultdict
 
 import numpy as np
 
-from beaver_ftc_logs.filtering import recent_scale
 from beaver_ftc_logs.fit_parts import FitPart, Parts
 from beaver_ftc_logs.folds import Fold, held_out_folds
 from beaver_ftc_logs.gains import gain_errors, standardized
 from beaver_ftc_logs.model import Model, NoiseModel
 from beaver_ftc_logs.noise_models import parts_of_noise
+from beaver_ftc_logs.posterior import recent_scale
 
 # Length of the windows in which the gains are estimated: chosen on seeds 11 and 12, in light turbulence.
 _GAIN_WINDOW_S = 10.0

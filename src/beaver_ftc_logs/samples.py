@@ -25,7 +25,8 @@ from beaver_ftc_logs.time_base import (
     unchanged_s,
 )
 from beaver_ftc_logs.usable_columns import MAX_NUMBER
-from beaver_ftc_logs.vehicle import QuantityColumn, Vehicle
+from beaver_ftc_logs.vehicle import Vehicle
+from beaver_ftc_logs.vehicle_columns import QuantityColumn
 
 # Limits of the dynamic pressure, over that at the reference airspeed, in `scale_by_airspeed`.
 _QDYN_RATIOS = (0.1, 10.0)

@@ -7,16 +7,14 @@ import numpy as np
 from beaver_ftc.results import Document
 from beaver_ftc_logs import extremes, trust
 from beaver_ftc_logs.bank import build_bank
-from beaver_ftc_logs.effect_errors import group_gain_sd, tied_shares
-from beaver_ftc_logs.filtering import bank_posterior, fault_evidence, page_cusum
+from beaver_ftc_logs.effect_errors import tied_shares
+from beaver_ftc_logs.evidence import fault_evidence, page_cusum
 from beaver_ftc_logs.fit_parts import Parts
 from beaver_ftc_logs.folds import Fold, fold_qualities, held_out_folds
-from beaver_ftc_logs.gains import squared_deviations
+from beaver_ftc_logs.gains import gain_sd_with_deviations
 from beaver_ftc_logs.model import Model
-from beaver_ftc_logs.noise_models import GAIN_SD_CAP
-from beaver_ftc_logs.orders import fit_of
+from beaver_ftc_logs.posterior import bank_posterior
 from beaver_ftc_logs.posterior_rows import NO_RESPONSE_LIMIT, rows_of_posterior
-from beaver_ftc_logs.recording import Floats
 from beaver_ftc_logs.refusals import refusal
 from beaver_ftc_logs.runs import runs_between
 from beaver_ftc_logs.scoring import score_against_labels
@@ -40,7 +38,7 @@ def add_ranges_and_threshold(parts: Parts, model: Model) -> Model:
     folds = list(held_out_folds(parts, model))
     peaks = [_healthy_peaks(fold) for fold in folds]
     tail = extremes.fit_peak_tail(peaks)
-    gain_sd = _gain_sd(parts, model, folds)
+    gain_sd = gain_sd_with_deviations(parts, model, folds)
     ranges = trust.compute_fitted_ranges(parts, tied_shares(parts, model), gain_sd).model_copy(
         update={"tail": tail}
     )
@@ -63,24 +61,6 @@ def add_ranges_and_threshold(parts: Parts, model: Model) -> Model:
             "identified": _cross_validate(peaks, rate, model),
         }
     )
-
-
-def _gain_sd(parts: Parts, model: Model, folds: Sequence[Fold]) -> Floats:
-    """Standard error of the gain of each group, sd (G,), of a gain that is 1 in the model:
-
-        sd = min(sqrt(s^2 + d^2), GAIN_SD_CAP)
-        d^2 = mean over k = 0 to K of d_k^2, 0 without other laws
-
-    s: standard error of the fit. d_1 to d_K: deviations of the gain from 1 in each of several flights left
-    out. d_0: the largest error by which the fit may misread the gain, sqrt(3) times its standard deviation
-    under the noise model with the largest.
-    """
-    variance = group_gain_sd(fit_of(parts, model), model) ** 2
-    if model.vehicle.other_laws:
-        misreads = [noise.misreads for noise in model.colours] or [[0.0] * len(model.groups)]
-        deviations = [squared_deviations(fold) for fold in folds] if len(parts) > 1 else []
-        variance += np.nanmean([3.0 * np.max(misreads, axis=0) ** 2, *deviations], axis=0)
-    return np.minimum(np.sqrt(variance), GAIN_SD_CAP)
 
 
 def _choose_threshold(tail: extremes.PeakTail | None, target: float, model: Model) -> float:

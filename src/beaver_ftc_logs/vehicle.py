@@ -1,16 +1,16 @@
 """The vehicle file: which columns of a log are rates and commands, and how each surface follows the commands.
 
-The file names columns, and has no code. Unknown keys and every other mistake are refused with one line each:
-`FILE:LINE: key: what is wrong, what is allowed`. The docstrings of the sections have a line for each key,
-which becomes its description.
+The file names columns (`vehicle_columns`), and has no code. Unknown keys and every other mistake are refused
+with one line each: `FILE:LINE: key: what is wrong, what is allowed`. The docstrings of the sections have a
+line for each key, which becomes its description.
 """
 
 import re
 from collections.abc import Collection, Iterable, Iterator
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-from pydantic import BeforeValidator, Field, model_serializer, model_validator
+from pydantic import Field, model_validator
 
 from beaver_ftc.documents import (
     BadInput,
@@ -27,7 +27,16 @@ from beaver_ftc.documents import (
 )
 from beaver_ftc.documents import validate_model as validate
 from beaver_ftc.scenario import looks_like_a_path
-from beaver_ftc_logs.units import ACCELERATION, ANGLE, LENGTH, RATE, SI_UNITS, SPEED, TIME_UNITS
+from beaver_ftc_logs.units import ACCELERATION, ANGLE, LENGTH, RATE, SI_UNITS, SPEED
+from beaver_ftc_logs.vehicle_columns import (
+    AttitudeColumns,
+    ColumnSpec,
+    EnergyColumns,
+    QuantityColumn,
+    RateColumns,
+    TimeColumn,
+    columns_below,
+)
 
 _MAX_FILE_BYTES = 1_000_000
 MAX_ALARMS_PER_HOUR = 1000.0
@@ -38,7 +47,6 @@ _BUILT_IN_FOLDER = Path(__file__).parent / "vehicles"
 
 VehicleName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$", max_length=100)]
 _SURFACE_NAME_PATTERN = re.compile(r"[A-Za-z0-9_-]{1,100}")
-ColumnName = Annotated[str, Field(min_length=1, max_length=200)]
 FaultKind = Literal["loss", "stuck"]
 # Key -> kind of unit of the columns below it; empty: a unit of any kind.
 _KINDS: dict[Location, str] = {
@@ -46,94 +54,6 @@ _KINDS: dict[Location, str] = {
     ("acceleration",): ACCELERATION, ("airspeed",): SPEED, ("energy", "altitude"): LENGTH,
     ("energy", "airspeed"): SPEED, ("flow", "alpha_rad"): ANGLE, ("flow", "beta_rad"): ANGLE,
 }  # fmt: skip
-
-
-class QuantityColumn(Section):
-    """A column of the log: the value in `unit` is `scale` times its number, plus `offset`. For SI units, the
-    name of the column is enough.
-
-    column: name of the column in the log
-    unit: unit of the numbers; left out: the SI unit
-    scale: factor on the numbers in the log, 1
-    offset: constant that is added, as the column
-    """
-
-    column: ColumnName = Field(examples=["gyro_x"])
-    unit: Literal[tuple(SI_UNITS)] | None = Field(default=None, examples=["deg/s"])  # type: ignore[valid-type]
-    scale: Number = number(1.0, unit="1", range="not 0", examples=[0.01])
-    offset: Number = number(0.0, unit="as the column", range="any", examples=[-1.5])
-
-    @model_validator(mode="after")
-    def _check_scale_not_zero(self) -> "QuantityColumn":
-        """Refuse a scale that makes every number the same."""
-        if self.scale == 0:
-            refuse([(("scale",), "0 leaves nothing of the column, allowed: any other number")])
-        return self
-
-    @model_serializer(mode="wrap")
-    def _serialize_plain(self, serialize: Any) -> Any:
-        """The name of the column alone, if unit, scale and offset are the defaults."""
-        is_plain = self.unit is None and self.scale == 1.0 and self.offset == 0.0
-        return self.column if is_plain else serialize(self)
-
-    def to_si(self, values: Any) -> Any:
-        """The column's numbers in SI: (scale values + offset) times the size of the unit in SI."""
-        factor = self.scale * (SI_UNITS[self.unit][1] if self.unit else 1.0)
-        return values * factor + self.offset * factor / self.scale
-
-
-ColumnSpec = Annotated[
-    QuantityColumn, BeforeValidator(lambda value: {"column": value} if isinstance(value, str) else value)
-]
-
-
-class TimeColumn(Section):
-    """The column of the time, if the log is a table.
-
-    column: name of the column
-    unit: unit of the numbers
-    """
-
-    column: ColumnName = Field(examples=["TimeUS"])
-    unit: Literal[tuple(TIME_UNITS)] = Field(default="s", examples=["us"])  # type: ignore[valid-type]
-
-
-class RateColumns(Section):
-    """The columns of the body rates.
-
-    p: column of the roll rate, rad/s
-    q: column of the pitch rate, rad/s
-    r: column of the yaw rate, rad/s
-    """
-
-    p: ColumnSpec = Field(examples=["p_rad_s"])
-    q: ColumnSpec = Field(examples=["q_rad_s"])
-    r: ColumnSpec = Field(examples=["r_rad_s"])
-
-
-class AttitudeColumns(Section):
-    """Columns of the attitude angles, which show wrong units and signs of the rates. `diagnose --aircraft`
-    requires them if turbulence is declared.
-
-    roll: column of the roll angle, rad
-    pitch: column of the pitch angle, rad
-    yaw: column of the yaw angle, rad
-    """
-
-    roll: ColumnSpec = Field(examples=["roll_rad"])
-    pitch: ColumnSpec | None = Field(default=None, examples=["pitch_rad"])
-    yaw: ColumnSpec | None = Field(default=None, examples=["yaw_rad"])
-
-
-class EnergyColumns(Section):
-    """Columns that show an engine failure: altitude and airspeed fall together.
-
-    altitude: column of the altitude, m
-    airspeed: column of the airspeed, m/s
-    """
-
-    altitude: ColumnSpec = Field(examples=["altitude_m"])
-    airspeed: ColumnSpec = Field(examples=["airspeed_m_s"])
 
 
 class Vehicle(Section):
@@ -266,7 +186,7 @@ class Vehicle(Section):
         The kind is empty where any unit may be right, and None of a flow that only the aircraft's model
         knows.
         """
-        located = _columns_below((), {key: value for key, value in self if key not in ("labels", "outputs")})
+        located = columns_below((), {key: value for key, value in self if key not in ("labels", "outputs")})
         return [(at, _KINDS.get(at, _KINDS.get(at[:1])), quantity) for at, quantity in located]
 
     @property
@@ -318,19 +238,7 @@ class Vehicle(Section):
 
     def column_names(self) -> list[str]:
         """Every column of a log that the vehicle file names, except the time."""
-        return list(dict.fromkeys(quantity.column for _, quantity in _columns_below((), self)))
-
-
-def _columns_below(location: Location, value: Any) -> Iterator[tuple[Location, QuantityColumn]]:
-    """Every column in a value of the file, and its place; location: place of the value."""
-    if isinstance(value, QuantityColumn):
-        yield location, value
-    elif isinstance(value, list):
-        for i, item in enumerate(value):
-            yield from _columns_below((*location, i), item)
-    elif isinstance(value, Section | dict):
-        for key, item in dict(value).items():
-            yield from _columns_below((*location, key), item)
+        return list(dict.fromkeys(quantity.column for _, quantity in columns_below((), self)))
 
 
 def _unknown_name_conflicts(

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import small
 
-from beaver_ftc_logs.filtering import recent_scale
+from beaver_ftc_logs.posterior import recent_scale
 from beaver_ftc_logs.preparation import assume_law_and_air
 
 BARE = {key: of for key, of in small.WING.items() if key != "labels"}

@@ -5,7 +5,7 @@ import pytest
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs import extremes
-from beaver_ftc_logs.filtering import page_cusum
+from beaver_ftc_logs.evidence import page_cusum
 from beaver_ftc_logs.vehicle import with_alarm_rate
 from products.logs import small
 

@@ -6,10 +6,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from beaver_ftc_logs import filtering
-from beaver_ftc_logs.bank import build_bank, build_states
+from beaver_ftc_logs.bank import build_bank
 from beaver_ftc_logs.diagnose import diagnose
-from beaver_ftc_logs.filtering import _with_command_delay, model_weights, run_flight
+from beaver_ftc_logs.evidence import fault_evidence
+from beaver_ftc_logs.flight_states import build_states
+from beaver_ftc_logs.posterior import _with_command_delay, model_weights, run_flight
 from beaver_ftc_logs.regression import innovations
 
 
@@ -62,5 +63,5 @@ def test_evidence_is_the_log_of_a_likelihood_ratio():
     posterior = np.column_stack([1 - fault, 0.25 * fault, 0.75 * fault])
     before = [0.2, 0.9 * 0.3 + 0.1 * 0.5, 0.9 * 0.6 + 0.1 * 0.5]
     expected = [np.log(p / (1 - p)) - np.log(q / (1 - q)) for p, q in zip(fault, before, strict=True)]
-    assert filtering.fault_evidence(posterior, bank) == pytest.approx(expected)
-    assert np.isfinite(filtering.fault_evidence(np.array([[0.0, 0.5, 0.5], [1.0, 0.0, 0.0]]), bank)).all()
+    assert fault_evidence(posterior, bank) == pytest.approx(expected)
+    assert np.isfinite(fault_evidence(np.array([[0.0, 0.5, 0.5], [1.0, 0.0, 0.0]]), bank)).all()

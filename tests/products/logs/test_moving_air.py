@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc_logs import column_mistakes, fitting, gyro_noise, loading, preparation
+from beaver_ftc_logs import column_mistakes, fitting, gyro_noise, loading, noise_search
 from beaver_ftc_logs.bank import build_bank
-from beaver_ftc_logs.filtering import bank_posterior
 from beaver_ftc_logs.fit_parts import fit_parts
+from beaver_ftc_logs.posterior import bank_posterior
 from beaver_ftc_logs.whitening import whiten_samples
 from products.logs import small
 
@@ -45,7 +45,7 @@ def fitted(flights):
 def flights():
     """Flights of two colours in turn, as a law answers rates, and the same whitened."""
     colours = [flown(AVERAGE if i % 2 else (1.0,), 0.5 + 0.2 * i, 4000, i) for i in range(4)]
-    return colours, preparation.whiten_flights(colours, VEHICLE)
+    return colours, noise_search.whiten_flights(colours, VEHICLE)
 
 
 @pytest.fixture(scope="module")
@@ -68,7 +68,7 @@ def test_a_louder_flight_counts_less_even_if_no_colour_changes():
     """Everything three times as large: the same colour, found at once, and a third of the weight."""
     flight = flown((1.0,), 0.5, 4000, 2)
     louder = replace(flight, rates=3.0 * flight.rates, commands=3.0 * flight.commands)
-    white = preparation.whiten_flights([flight, louder], VEHICLE)
+    white = noise_search.whiten_flights([flight, louder], VEHICLE)
     assert white[0].noise_ma_coefficients == white[1].noise_ma_coefficients
     assert white[0].fit_weight == pytest.approx(3.0 * white[1].fit_weight)
 

@@ -16,14 +16,14 @@ from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.documents import BadInput
 from beaver_ftc.loop import FLOW
 from beaver_ftc.results import Document
-from beaver_ftc_logs import findings
 from beaver_ftc_logs.aircraft_inputs import DiagnosedAircraft, LogInputs, read_inputs
+from beaver_ftc_logs.aircraft_verdict import verdict_document
 from beaver_ftc_logs.column_mistakes import MAX_REVERSED_GAIN
 from beaver_ftc_logs.diagnose import reversed_command_error
 from beaver_ftc_logs.log_rows import LogRows
 from beaver_ftc_logs.recording import Floats, Mask, Reasons, RecordedFlight
 from beaver_ftc_logs.refusals import refusal
-from beaver_ftc_logs.stepped import Replayed, error_sections, named_since, replay_samples, rows_of_replay
+from beaver_ftc_logs.stepped import Replayed, error_sections, replay_samples, rows_of_replay
 from beaver_ftc_logs.vehicle import Vehicle
 
 # If no fault explains an alarm in this first part of a stretch, the model or the declared errors are wrong.
@@ -71,7 +71,7 @@ def diagnose_aircraft(
         for corrected, error in _corrected_inputs(inputs, replay):
             if _credible_rows(corrected, _replay(corrected)).clears_alarm(rows):
                 raise error
-    return inputs, rows, _verdict_document(inputs, rows, replay, diagnosed[1])
+    return inputs, rows, verdict_document(inputs, rows, replay, diagnosed[1])
 
 
 def _replay(inputs: LogInputs) -> Replayed:
@@ -175,52 +175,3 @@ def _unexplained_rows(inputs: LogInputs, replay: Replayed) -> Mask:
             detected = [verdict.detected for verdict in first_verdicts]
             unexplained[begin + detected.index(True) : end] = True
     return unexplained
-
-
-def _verdict_document(
-    inputs: LogInputs, rows: LogRows, replay: Replayed, declared_errors: Document
-) -> Document:
-    """The document of verdict.json."""
-    samples = inputs.samples
-    aircraft = inputs.aircraft
-    surfaces = list(aircraft.surfaces)
-    alarms = np.flatnonzero(rows.faulty).tolist()
-    verdicts = [replay.verdicts[k] for k in alarms]
-    last = verdicts[-1] if alarms else Verdict()
-    held = [
-        f"{name} is held, {age_s:.2g} s old on average: errors declared have to cover it"
-        for name, age_s in inputs.held_age_s.items()
-    ]
-    return {
-        "flight": samples.name,
-        "aircraft": aircraft.name,
-        "declared": declared_errors,
-        **findings.span_entry(samples),
-        "faulty": bool(alarms),
-        "detection_s": float(samples.t_s[alarms[0]]) if alarms else None,
-        "isolation_s": named_since(samples.t_s[alarms], verdicts),
-        "isolated": last.isolated,
-        "type": last.type,
-        "estimate": last.estimate,
-        "candidates": list(last.candidates),
-        "credible": rows.credibility(),
-        "events": findings.fault_events(rows, surfaces),
-        "can_separate": _excluded_losses(rows, surfaces),
-        "isolability": {"together": []},
-        "notes": [*samples.notes, *held],
-    }
-
-
-def _excluded_losses(rows: LogRows, surfaces: list[str]) -> list[str]:
-    """One sentence for each surface: the loss of effectiveness that is excluded within a second in half of
-    the healthy rows."""
-    quiet = (rows.faulty == 0) & (rows.credible == 1)
-    if not quiet.any():
-        return []
-    losses = 1.0 - np.median(rows.effectiveness_low[quiet], axis=0)
-    return [
-        f"{name}: a loss of more than {100.0 * loss:.2g} % shows within a second in half of the flight."
-        if loss < 0.995  # two digits are printed
-        else f"{name}: in half of the flight not even a complete loss would show within a second."
-        for name, loss in zip(surfaces, losses.tolist(), strict=True)
-    ]

@@ -8,8 +8,9 @@ import numpy as np
 from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document
 from beaver_ftc_logs import physics
+from beaver_ftc_logs.likely_logs import read_likely
 from beaver_ftc_logs.loading import read_vehicle_parts
-from beaver_ftc_logs.proposal import NoVehicleError, guess_vehicle, rates_agree, read_likely
+from beaver_ftc_logs.proposal import NoVehicleError, guess_vehicle, rates_agree
 from beaver_ftc_logs.recording import RecordedFlight
 from beaver_ftc_logs.samples import convert_to_si, resample
 from beaver_ftc_logs.usable_columns import named_angles

@@ -232,24 +232,24 @@ def _check_options_agree(options: DiagnoseOptions) -> None:
     by_aircraft = options.aircraft is not None
     by_model = options.model is not None
     names_detector = options.detector != "bank-of-filters"
-    alone = not by_aircraft
-    without_model = not (by_aircraft or by_model)
-    only_aircraft = "allowed: only with --aircraft NAME"
-    only_model = "allowed: only with --model MODEL or --aircraft NAME"
-    aircraft_with = f"--aircraft with --detector {options.detector}"
-    mistakes = {
-        "--model and --aircraft: allowed: one of them": by_aircraft and by_model,
-        f"{aircraft_with}: allowed: none, fdi.scheme of --scenario names it": by_aircraft and names_detector,
-        f"--scenario {options.scenario}: {only_aircraft}": options.scenario is not None and alone,
-        f"--vehicle {options.vehicle}: {only_aircraft}": options.vehicle is not None and alone,
-        f"--certificate: {only_aircraft}": options.certificate and alone,
-        f"--score: {only_model}": options.score and without_model,
-        f"--detector: {only_model}": names_detector and without_model,
-        f"--reader: {only_model}": options.reader is not None and without_model,
+    if by_aircraft and by_model:
+        raise BadInput("diagnose: --model and --aircraft: allowed: one of them")
+    if by_aircraft and names_detector:
+        reason = f"--detector {options.detector}: allowed: none, fdi.scheme of --scenario names it"
+        raise BadInput(f"diagnose: --aircraft with {reason}")
+    aircraft = by_aircraft, "--aircraft NAME"
+    either = by_aircraft or by_model, "--model MODEL or --aircraft NAME"
+    needs = {
+        f"--scenario {options.scenario}": (options.scenario is not None, *aircraft),
+        f"--vehicle {options.vehicle}": (options.vehicle is not None, *aircraft),
+        "--certificate": (options.certificate, *aircraft),
+        "--score": (options.score, *either),
+        "--detector": (names_detector, *either),
+        "--reader": (options.reader is not None, *either),
     }
-    for mistake, is_made in mistakes.items():
-        if is_made:
-            raise BadInput(f"diagnose: {mistake}")
+    for option, (is_given, is_allowed, needed) in needs.items():
+        if is_given and not is_allowed:
+            raise BadInput(f"diagnose: {option}: allowed: only with {needed}")
 
 
 def _diagnose_with_aircraft(options: DiagnoseOptions) -> None:

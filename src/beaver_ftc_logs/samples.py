@@ -111,9 +111,8 @@ def resample(log: RecordedFlight, vehicle: Vehicle) -> Samples:
         return sample_column(column, t_s, step_s)[0] if column else np.full(len(t_s), np.nan)
 
     defects = (column_defect_texts(name, log.columns[name], name in rate_names) for name in used)
-    energy_columns = vehicle.energy
-    altitude_m = sampled(energy_columns.altitude if energy_columns else None)
-    airspeed_mps = sampled(energy_columns.airspeed if energy_columns else None)
+    altitude_m = sampled(getattr(vehicle.energy, "altitude", None))
+    airspeed_mps = sampled(getattr(vehicle.energy, "airspeed", None))
     samples = Samples(
         name=log.name,
         t_s=t_s,

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc_logs.readers.text import TableCells
+from beaver_ftc_logs.readers.cells import TableCells
 from beaver_ftc_logs.refusals import refusal
 
 _BYTES_PER_NUMBER = 8

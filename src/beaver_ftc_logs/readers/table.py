@@ -10,8 +10,9 @@ import numpy as np
 
 from beaver_ftc.documents import BadInput
 from beaver_ftc_logs.readers import LAST_PART_FACTOR, PART_OVERLAP_SHARE, check_is_log_itself
+from beaver_ftc_logs.readers.cells import TableCells, join_blocks
 from beaver_ftc_logs.readers.parquet_table import BATCH_ROWS, MAX_ROWS, ParquetTable
-from beaver_ftc_logs.readers.text import TableCells, TextTable, join_blocks, unreadable_error
+from beaver_ftc_logs.readers.text import TextTable, unreadable_error
 from beaver_ftc_logs.recording import Column, Floats, RecordedFlight, TimeSource, Wanted, nearest_names_text
 from beaver_ftc_logs.refusals import refusal
 from beaver_ftc_logs.units import TIME_UNITS

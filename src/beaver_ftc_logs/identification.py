@@ -18,6 +18,7 @@ from beaver_ftc_logs.noise_models import AR_ORDER
 from beaver_ftc_logs.noise_search import whiten_flights
 from beaver_ftc_logs.preparation import assume_law_and_air
 from beaver_ftc_logs.samples import Samples
+from beaver_ftc_logs.scoring import worst_of
 from beaver_ftc_logs.vehicle import Vehicle
 from beaver_ftc_logs.whitening import UNFITTED_GYROS_RAD_S, UNFITTED_MA, whiten_samples
 
@@ -89,18 +90,16 @@ def add_unseen_noise(model: Model, flights: Sequence[Samples]) -> Model:
 
 
 def expect_another_day(folds: list[Document], model: Model) -> Document:
-    """The errors to expect on a day that was not fitted: mean and worst score of the parts left out. The
-    worst of `mean_error` is the largest, of all other scores the least. If a rate of false alarms is
-    requested and the model has a tail, also: the rate with its bounds, 1/h, the minutes of healthy flight
-    that are missing to show this rate without a fitted tail, and the test of the threshold: `identified` of
-    `validation.add_ranges_and_threshold`.
+    """The errors to expect on a day that was not fitted: mean and worst score of the parts left out. If a
+    rate of false alarms is requested and the model has a tail, also: the rate with its bounds, 1/h, the
+    minutes of healthy flight that are missing to show this rate without a fitted tail, and the test of the
+    threshold: `identified` of `validation.add_ranges_and_threshold`.
     """
     expected: Document = {}
     if scores := [fold["score"] for fold in folds if "score" in fold]:
         for key in SCORES:
             values = [score[key] for score in scores]
-            worst = max(values) if key == "mean_error" else min(values)
-            expected[key] = {"mean": float(np.mean(values)), "worst": float(worst)}
+            expected[key] = {"mean": float(np.mean(values)), "worst": float(worst_of(key, values))}
     tail = model.fitted.tail
     threshold = model.settings.threshold
     rate = model.settings.false_alarms_per_hour

@@ -4,6 +4,7 @@ The scores are computed after the diagnosis (`--score`, the benchmark, the tests
 filter never uses them.
 """
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -67,6 +68,11 @@ def score_against_labels(rows: LogRows, labels: Floats) -> Document:
         "mean_error": float(np.abs(e - truth).mean()),
         "held_by_bounds": float(np.mean((low <= truth) & (truth <= high))),
     }
+
+
+def worst_of(key: str, values: Iterable[float]) -> float:
+    """The worst value of a score: the largest `mean_error`, the least of any other score."""
+    return max(values) if key == "mean_error" else min(values)
 
 
 def nearest_setting(e: Floats, levels: Floats) -> np.ndarray:

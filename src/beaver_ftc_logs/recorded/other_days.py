@@ -29,7 +29,6 @@ TUNING_SEEDS = range(8)
 TEST_SEEDS = range(8, 16)
 _SEED = 20  # of all draws, with the seed of a drawn day
 _RIVAL_DETECTOR = "sliding-least-squares"
-_WORST_OF_SCORE = {"mean_error": max}  # of every other score, the smallest is the worst
 _TRIM_MEAN_S = 30.0  # the running mean over this time is the trim
 _DRIFT_TIME_S = 300.0  # correlation time of the drift of the trim
 
@@ -220,5 +219,5 @@ def _summarize_days(kind: str, days: Sequence[Document]) -> Document:
     return {
         "kind": kind,
         "mean": {key: float(np.mean(of_days)) for key, of_days in values.items()},
-        "worst": {key: _WORST_OF_SCORE.get(key, min)(of_days) for key, of_days in values.items()},
+        "worst": {key: scoring.worst_of(key, of_days) for key, of_days in values.items()},
     }

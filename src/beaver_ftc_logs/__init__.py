@@ -7,7 +7,8 @@ vehicle     `vehicle` has the vehicle file; `vehicle_of_logs` fills it by the `m
 regression  `regression` makes the one regression of a flight; all below select from it.
 fit         `preparation` scales flights, `noise_search` whitens them. `orders` fits, `noise_models`,
             `effect_errors`, `gains` and `noise_inflation` say how well the fit is known. `fitting` has the
-            settings (some by `setting_estimates`), `validation` the threshold. `identification` calls all of these and tests the `model`.
+            settings, some from `setting_estimates`; `validation` has the threshold. `identification`
+            calls all of these and tests the `model`.
 diagnose    `column_mistakes` and `motion_units` refuse a log. `bank` and `flight_states` make the
             hypotheses and states of the filters (`filtering`), `posterior` and `evidence` their
             probabilities, `posterior_rows` and `naming` the rows of the diagnosis. `trust` withdraws

@@ -152,14 +152,8 @@ class Vehicle(Section):
             mistakes += _unknown_name_conflicts(at, weights, "command", commands)
             if not any(weights.values()):
                 mistakes.append((at, "no command moves it, allowed: a weight that is not 0"))
-        tables: dict[str, Collection[str]] = {
-            "labels": self.labels,
-            "outputs": self.outputs,
-            "full_deflection_rad": self.full_deflection_rad,
-            "airspeed_powers": self.airspeed_powers,
-        }
-        for key, values in tables.items():
-            mistakes += _unknown_name_conflicts((key,), values, "surface", self.surfaces)
+        for key in ("labels", "outputs", "full_deflection_rad", "airspeed_powers"):
+            mistakes += _unknown_name_conflicts((key,), getattr(self, key), "surface", self.surfaces)
         refuse([*mistakes, *self._unit_mistakes()])
         return self
 

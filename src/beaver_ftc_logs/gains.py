@@ -47,7 +47,7 @@ def gain_errors(fold: Fold, window_s: float | None = None, loudness: float = 1.0
     Without window_s: one pair, with a gain for each group; the effects of its axes are added. With window_s:
     a pair for each window of about this length, with a gain for each axis of each group. The gains of the
     three axes of a group then have the same prior error. loudness: ratio of variances by which the filter
-    widens its noise itself (`_loudness`).
+    widens its noise itself (`noise_inflation`).
     """
     known = trust.known_effects(fold.model)
     flight = fold.innovations()

@@ -26,8 +26,9 @@ from beaver_ftc.diagnosis import TYPE_ROWS as TYPES
 from beaver_ftc.results import Document
 from beaver_ftc.scenario import Scenario
 from beaver_ftc_assurance.certificates.history import History, declared_errors_of
-from beaver_ftc_assurance.certificates.inequality import Hypothesis, theta_bounds_by_frame
+from beaver_ftc_assurance.certificates.inequality import Hypothesis
 from beaver_ftc_assurance.certificates.kinds import hypothesis_of_type, travel_rad
+from beaver_ftc_assurance.certificates.search import theta_bounds_by_frame
 from beaver_ftc_assurance.certificates.tape import Tape
 from beaver_ftc_assurance.doublet import LONGEST_S, Situation, doublet
 
@@ -85,11 +86,12 @@ def situation_of(tape: Tape, scenario: Scenario, rate: float) -> Situation:
     )  # fmt: skip
 
 
-def candidates(tape: Tape, history: History) -> Iterator[Candidate]:
+def candidates(history: History) -> Iterator[Candidate]:
     """Every fault of RELATIONS that is not excluded, with the interval of its parameter; left out if the
     interval is empty. None at all if the diagnosis reports a fault of no known type, or if health explains
     all frames since the alarm. The other frames alone give the interval: in a frame that health explains, the
     fault may be absent."""
+    tape = history.tape
     last = tape.last.diagnosis
     frames = np.arange(round(last.detected_at_s / tape.last.dt_s), tape.end)  # from the alarm on
     shown = frames[history.is_unexplained(frames)]
@@ -100,7 +102,7 @@ def candidates(tape: Tape, history: History) -> Iterator[Candidate]:
             continue
         low, high = RELATIONS[kind].theta_span(*travel_rad(tape, s))
         if low < high:
-            low, high = _interval(hypothesis_of_type(tape, s, kind), history, shown)
+            low, high = _interval(hypothesis_of_type(history, s, kind), shown)
         if low <= high:
             yield Candidate(s, kind, low, high)
 
@@ -118,10 +120,10 @@ def faults_left(diagnosis: DiagnosisReadout) -> Iterator[tuple[int, int]]:
             yield from ((s, kind) for kind in np.flatnonzero(~surface.is_type_excluded).tolist())
 
 
-def _interval(hypothesis: Hypothesis, history: History, frames: np.ndarray) -> tuple[float, float]:
+def _interval(hypothesis: Hypothesis, frames: np.ndarray) -> tuple[float, float]:
     """The interval of a parameter that is constant in these frames: the intersection of those of frames and
     axes."""
-    lower, upper, _ = theta_bounds_by_frame(hypothesis, history, frames)
+    lower, upper, _ = theta_bounds_by_frame(hypothesis, frames)
     return max(hypothesis.theta_low, float(lower.max())), min(hypothesis.theta_high, float(upper.min()))
 
 

@@ -62,9 +62,9 @@ def separate(scenario: Scenario, rate_deg_s: float = LARGEST_RATE_DEG_S) -> Docu
     landing = fly(scenario, log, watch=recorder.watch)
     if landing.detection_time_s is None:
         raise BadInput(f"{scenario.name}: no alarm was raised, allowed with separate: a flight with one")
-    tape, history = _tape_and_history(scenario, log, recorder)
-    situation = situation_of(tape, scenario, radians(rate_deg_s))
-    left = [*candidates(tape, history)]
+    history = _history(scenario, log, recorder)
+    situation = situation_of(history.tape, scenario, radians(rate_deg_s))
+    left = [*candidates(history)]
     names = scenario.airframe.surfaces
     if len(left) < 2:
         raise BadInput(f"{scenario.name}: one candidate or none is left, allowed with separate: two at least")
@@ -81,7 +81,7 @@ def separate(scenario: Scenario, rate_deg_s: float = LARGEST_RATE_DEG_S) -> Docu
         "time_s": landing.frames / scenario.rate_hz,
         "assumes": "the parameter of the fault stays as it is",
         "largest_rate_deg_s": rate_deg_s,
-        "not_constant": open_courses(tape, names),
+        "not_constant": open_courses(history.tape, names),
         "pairs": pairs,
         "passed": all(len(pair.get("left", ())) < 2 for pair in pairs),
     }
@@ -158,15 +158,15 @@ def write(document: Document, scenario: Scenario, out: Path) -> Path:
     return out / name
 
 
-def _tape_and_history(scenario: Scenario, log: MemoryLog, recorder: Recorder) -> tuple[Tape, History]:
-    """Tape and history of a flight from its alarm to its end. Raises BadInput if it ends with the alarm."""
+def _history(scenario: Scenario, log: MemoryLog, recorder: Recorder) -> History:
+    """History of a flight, its tape from the alarm to the end. Raises BadInput if it ends with the alarm."""
     rows = logged_columns(log)
     detected = rows["detected"]
     alarm = row_set_to_end(detected)
     if alarm >= len(detected) - 1:
         raise BadInput(f"{scenario.name}: the flight ends with its alarm, allowed: a longer duration_s")
     tape = recorder.tape([alarm, len(detected) - 1], len(detected))
-    return tape, history_of(scenario, rows, tape)
+    return history_of(scenario, rows, tape)
 
 
 def open_courses(tape: Tape, names: Sequence[str]) -> list[str]:

@@ -11,7 +11,6 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import chain
-from math import inf
 from pathlib import Path
 
 import numpy as np
@@ -23,12 +22,8 @@ from beaver_ftc.diagnosis.detection import filter_poles
 from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Log, StoredLog
 from beaver_ftc.scenario import Declared, Scenario, to_yaml
-from beaver_ftc_assurance.certificates import chance, courses, instruments_say, kinds
-from beaver_ftc_assurance.certificates.certified import (
-    LOG_NAME,
-    Certified,
-    with_digest,
-)
+from beaver_ftc_assurance.certificates import chance, courses, instruments_say, kinds, search
+from beaver_ftc_assurance.certificates.certified import LOG_NAME, Certified, with_digest
 from beaver_ftc_assurance.certificates.check_certificate import FORMAT_VERSION
 from beaver_ftc_assurance.certificates.evidence_columns import evidence_columns
 from beaver_ftc_assurance.certificates.history import (
@@ -42,13 +37,8 @@ from beaver_ftc_assurance.certificates.inequality import (
     ANY,
     CONSTANT,
     Hypothesis,
-    Term,
-    axis_directions,
-    constant_theta_tests,
-    filters,
     first_violated,
     no_fault,
-    single_frame_tests,
 )
 from beaver_ftc_assurance.certificates.tape import Recorder, Tape, tape_of_flight_again
 
@@ -58,7 +48,6 @@ MEASURED_MODEL_BOUND = "measured_rad_s", "design_rad_s2", "eta_bar_rad_s2"
 _LOGGED_COLUMNS = {"watch_missing"} | {f"{axis}_{end}" for axis in AXES for end in MEASURED_MODEL_BOUND}
 _EVENT_COLUMN = re.compile("detected|fie_.*_excluded")  # columns of the alarm and of exclusions
 _SHARE_SUFFIX = "_likelihood_share"  # end of the name of a column with a share of the alarm level
-ADDING_POLE_PER_S = 0.1  # so slow that the filter is nearly the sum over a block
 
 
 def certificate(
@@ -88,7 +77,7 @@ def certificate(
         if recorder
         else tape_of_flight_again(scenario, frames_of_events, n)
     )
-    flight = _Flight(scenario, rows, tape, history_of(scenario, rows, tape))
+    flight = _Flight(scenario, rows, history_of(scenario, rows, tape))
     for statement in flight.statements(events):
         if "because" in statement:  # not certified: without a row, since nothing can prove it
             statement.pop("frame", None)
@@ -154,18 +143,25 @@ def history_of(scenario: Scenario, rows: Columns, tape: Tape) -> History:
     x, F, eta_bar = (
         np.column_stack([rows[f"{axis}_{end}"] for axis in AXES]) for end in MEASURED_MODEL_BOUND
     )
-    return History(1.0 / scenario.rate_hz, scenario.substeps, x, F, eta_bar, declared_errors_of(tape.alarm))
+    return History(
+        1.0 / scenario.rate_hz, scenario.substeps, x, F, eta_bar, declared_errors_of(tape.alarm), tape,
+        row_set_to_end(rows["detected"]),
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)
 class _Flight:
-    """A flight with events: columns of its log, and the recorded quantities (`Tape`). Letters: e number of an
-    isolation estimator, s of a surface, k of a frame, m of a detection filter."""
+    """A flight with events: columns of its log, and its history. Letters: e number of an isolation estimator,
+    s of a surface, k of a frame."""
 
     scenario: Scenario
     rows: Columns
-    tape: Tape
     history: History
+
+    @property
+    def tape(self) -> Tape:
+        """The recorded quantities."""
+        return self.history.tape
 
     def statements(self, events: dict[str, int]) -> Iterator[Document]:
         """A statement for each event and, with the fault class `all`, for each excluded type; for the alarm
@@ -188,10 +184,10 @@ class _Flight:
             k = events[column]
             evidence: Document = {"because": kinds.TOO_LATE}
             if k < tape.end:
-                evidence = self._exclusion(e, alarm, k) or chance.exclusion_by_alarm(tape, e, of_alarm)
+                evidence = self._exclusion(e, k) or chance.exclusion_by_alarm(tape, e, of_alarm)
             yield {"what": name, "column": column, "frame": k} | evidence
         if self.scenario.fdi.fault_class == "all":
-            yield from self._types(max(alarm, 1))  # the first row has no innovation
+            yield from self._types()
 
     def _alarm(self, k: int, is_ours: bool) -> Document:
         """Evidence of the alarm at row k. is_ours: whether our scheme was in charge. The first source that
@@ -212,27 +208,24 @@ class _Flight:
         if not is_ours:
             return {"because": "another scheme was in charge"}
         by_chance = self.scenario.fdi.statistical and chance.alarm_evidence(
-            self.tape, self.history, self.scenario.airframe.surfaces, self.rows, k
+            self.history, self.scenario.airframe.surfaces, self.rows, k
         )
         return by_chance or {"because": chance.ALARM_NOT_STATED}
 
     def _filter_alarm(self, k: int) -> Document | None:
         """Evidence that the innovation of frame k, or a detection filter at frame k, exceeds its bound; None
         if none does, or if the diagnosis had not begun before frame k."""
-        tape = self.tape
-        all_axes = (0, 1, 2)
-        if k <= tape.since:
+        if k <= self.tape.since:
             return None
-        filtered = (filters(pole, tape.since, k, all_axes) for pole in self._detection_poles)
-        health = no_fault(tape.first, tape.end - tape.first)
-        return first_violated(chain(filters(inf, k - 1, k, all_axes), *filtered), health, self.history)
+        tests = search.of_alarm(self.history, self._detection_poles, k)
+        return first_violated(tests, no_fault(self.history))
 
     @property
     def _detection_poles(self) -> list[float]:
         """Poles of the detection filters, 1/s (docs/explanation/detection.md, "A bank of poles")."""
         return list(filter_poles(self.scenario.fdi, Declared.of(self.scenario)))
 
-    def _exclusion(self, e: int, alarm: int, k: int) -> Document | None:
+    def _exclusion(self, e: int, k: int) -> Document | None:
         """Evidence against the fault of estimator e at frame k, the first of these inequalities that is
         violated; None if none is:
 
@@ -243,89 +236,64 @@ class _Flight:
         The isolation filter starts at the alarm, and the two frames are not before it.
         """
         tape = self.tape
+        alarm = self.history.alarm
         config = self.scenario.fdi
-        history = self.history
         estimator = tape.alarm.diagnosis.estimators[e]
         if k == 0:  # the first row has no innovation
             return None
-        hypothesis = Hypothesis(
-            tape.first, tape.offset[:, e], tape.slope[:, e], tape.spread[:, e], estimator.theta_min,
+        varying = Hypothesis(
+            self.history, tape.offset[:, e], tape.slope[:, e], tape.spread[:, e], estimator.theta_min,
             estimator.theta_max, axes=estimator.active_axes,
         )  # fmt: skip
-        since_alarm = [*filters(config.isolation_pole_per_s, alarm, k, hypothesis.axes)] if k > alarm else []
-        memory = self._filter_tests(e, estimator.parity_direction, hypothesis.axes, k)
-        evidence = first_violated(
-            chain(single_frame_tests(k, hypothesis), memory, since_alarm), hypothesis, history
+        constant = replace(varying, theta=CONSTANT)
+        since_alarm = (
+            [*search.filters(config.isolation_pole_per_s, alarm, k, varying.axes)] if k > alarm else []
         )
-        if evidence is not None:
-            return evidence
-        lasting = replace(hypothesis, theta=CONSTANT)
-        candidates: list[list[Term]] = []
-        if estimator.hypothesis_kind == LOSS and config.fault_profile == "abrupt":
-            candidates = [constant_theta_tests(lasting, history, np.arange(alarm, k + 1))]
-        elif config.thresholds == "published":
-            candidates = since_alarm
-        return first_violated(candidates, lasting, history)
+        by_filters = search.of_detection_filters(
+            varying, self._detection_poles, e, estimator.parity_direction, k
+        )
+        evidence = first_violated(chain(search.of_one_frame(varying, k), by_filters, since_alarm), varying)
+        if evidence is None and estimator.hypothesis_kind == LOSS and config.fault_profile == "abrupt":
+            evidence = first_violated([search.of_constant_theta(constant, np.arange(alarm, k + 1))], constant)
+        elif evidence is None and config.thresholds == "published":
+            evidence = first_violated(since_alarm, constant)
+        return evidence
 
-    def _filter_tests(
-        self, e: int, across: np.ndarray, axes: tuple[int, ...], k: int
-    ) -> Iterator[list[Term]]:
-        """Inequalities of the detection filters, each with a bound on the fault's effect in the filter before
-        the first kept frame (reach). across (3,): direction in which the fault has no effect, zeros if there
-        is none; it is used if the fault is tested on all axes. The last axis of `reach_low` and `reach_high`
-        has the three axes, and this direction as the fourth."""
-        tape = self.tape
-        directions = [([*axis_directions((i,))], i) for i in axes]
-        directions += [([across, -across], 3)] if across.any() and len(axes) == 3 else []
-        for m, pole in enumerate(self._detection_poles):
-            for both_ways, i in directions:
-                for d, reach in zip(both_ways, (tape.reach_high, -tape.reach_low), strict=True):
-                    yield [Term(d, pole, tape.since, k, effect_before=float(reach[e, m, i]))]
-
-    def _types(self, alarm: int) -> Iterator[Document]:
+    def _types(self) -> Iterator[Document]:
         """A statement for each type that is excluded at the end of the flight, surface by surface. Its column
         is one of `evidence_columns`; a type that was excluded after the tape has none. If types are tested by
-        blocks of frames, tape, history and alarm are those by blocks; without a complete block, no type is
-        certified."""
-        tape = self.tape
-        history = self.history
-        if tape.alarm.diagnosis.types_config.frames_per_block > 1:
-            tape, history, alarm = in_blocks(tape, history, alarm)
-        any_block = len(tape.types) > 0
-        with_flags = tape if any_block else self.tape
+        blocks of frames, the history is that by blocks; without a complete block, no type is certified."""
+        # the first row has no innovation
+        history = in_blocks(replace(self.history, alarm=max(self.history.alarm, 1)))
+        any_block = len(history.tape.types) > 0
+        with_flags = history.tape if any_block else self.tape
         for s, kind, k in kinds.excluded_types(with_flags):
             surface = self.scenario.airframe.surfaces[s]
             if k == with_flags.end:
                 yield {"what": kinds.exclusion_name(surface, kind), "because": kinds.TYPE_TOO_LATE}
                 continue
             row = self.tape.first + row_set_to_end(self.tape.types[:, s, kind])
-            because = kinds.reason_not_certified(tape, kind) if any_block else kinds.EXCLUDED_BY_MANY_FRAMES
-            evidence = None if because else self._type(tape, history, s, kind, alarm, k)
+            because = kinds.EXCLUDED_BY_MANY_FRAMES
+            evidence: Document | None = None
+            if any_block:
+                reason = kinds.reason_not_certified(history.tape, kind)
+                because = reason or because
+                evidence = None if reason else self._type(history, s, kind, k)
             yield {
                 "what": kinds.exclusion_name(surface, kind),
                 "column": kinds.exclusion_column(surface, kind), "frame": row,
-            } | (evidence or {"because": because or kinds.EXCLUDED_BY_MANY_FRAMES})  # fmt: skip
+            } | (evidence or {"because": because})  # fmt: skip
 
-    def _type(self, tape: Tape, history: History, s: int, kind: int, alarm: int, k: int) -> Document | None:
-        """Evidence against a type on surface s at frame k; None if there is none. tape, history, alarm, k: by
-        frames or, if types are tested by blocks, by blocks."""
+    def _type(self, history: History, s: int, kind: int, k: int) -> Document | None:
+        """Evidence against a type on surface s at frame k; None if there is none. history, k: by frames or,
+        if types are tested by blocks, by blocks."""
         if TYPES[kind].frames_test:
-            return courses.evidence(self.scenario, tape, history, s, kind, alarm)
-        hypothesis = kinds.hypothesis_of_type(tape, s, kind)
+            return courses.evidence(self.scenario, history, s, kind)
+        hypothesis = kinds.hypothesis_of_type(history, s, kind)
         if history.length == 1 or hypothesis.theta != ANY:
-            return first_violated(
-                kinds.candidate_inequalities(hypothesis, history, alarm, k), hypothesis, history
-            )
-        return self._sum_of_block(kinds.hypothesis_of_type(self.tape, s, kind), history, k)
-
-    def _sum_of_block(self, hypothesis: Hypothesis, blocks: History, k: int) -> Document | None:
-        """Evidence of the block before block k, or of block k, as a sum over its frames, in which theta may
-        differ. The effects of a fault must be kept from the row before the block on."""
-        L = blocks.length
-        starts = [blocks.begin + block * L - 1 for block in (k - 1, k)]
-        kept = (start for start in starts if start >= hypothesis.first_frame)
-        candidates = (filters(ADDING_POLE_PER_S, start, start + L, hypothesis.axes) for start in kept)
-        return first_violated(chain.from_iterable(candidates), hypothesis, self.history)
+            return first_violated(search.of_type(hypothesis, k), hypothesis)
+        by_frames = kinds.hypothesis_of_type(self.history, s, kind)
+        return first_violated(search.of_block(by_frames, history, k), by_frames)
 
     def declared_fields(self, statements: list[Document]) -> Document:
         """The fields of the certificate that all statements share: declared errors, times, Earth's rate. The

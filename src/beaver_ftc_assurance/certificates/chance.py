@@ -32,7 +32,7 @@ ALARM_NOT_STATED = "chance raised it: an onset long before, a tone, or a force"
 
 
 def alarm_evidence(
-    tape: Tape, history: History, surfaces: Sequence[str], rows: Mapping[str, np.ndarray], k: int
+    history: History, surfaces: Sequence[str], rows: Mapping[str, np.ndarray], k: int
 ) -> Document | None:
     """The evidence of a statistical alarm at row k; None if its onset is too old, or if the ratio from the
     frames does not exceed 1, or differs from the score of the detector.
@@ -40,6 +40,7 @@ def alarm_evidence(
     rows: the log, whose column has the largest share of the alarm level over all blocks of a hypothesis, so
     at least the share of this evidence. first: the last row at which the slot of the largest score restarted.
     """
+    tape = history.tape
     diagnosis = tape.alarm.diagnosis
     b, h = _largest_score(diagnosis.statistical_filters)
     block = diagnosis.statistical_filters[b]
@@ -49,7 +50,7 @@ def alarm_evidence(
     if first is None or k - first >= MAX_WRITTEN_FRAMES:
         return None
     score = hypothesis.score_in_std / diagnosis.statistical_alarm_level
-    ratio = _likelihood_ratio(tape, history, (b, h, slot), range(first, k + 1))
+    ratio = _likelihood_ratio(history, (b, h, slot), range(first, k + 1))
     if score > 1.0 + LOGGED_SCORE_TOLERANCE:
         ratio = ratio.without_negligible()
     value, limit = ratio.sides
@@ -100,9 +101,7 @@ def _largest_score(blocks: Sequence[StatisticalBlock]) -> tuple[int, int]:
     return max(places, key=lambda bh: blocks[bh[0]].hypotheses[bh[1]].score_in_std, default=(0, 0))
 
 
-def _likelihood_ratio(
-    tape: Tape, history: History, test: tuple[int, int, int], rows: range
-) -> LikelihoodRatio:
+def _likelihood_ratio(history: History, test: tuple[int, int, int], rows: range) -> LikelihoodRatio:
     """The ratio of a test (b, h, slot) over the given rows.
 
     before, now: quantities at the end of the row before each row, and of the row itself. The detector
@@ -112,6 +111,7 @@ def _likelihood_ratio(
     declared constants that act on these axes.
     """
     b, h, slot = test
+    tape = history.tape
     dt = history.dt
     diagnosis = tape.alarm.diagnosis
     block = diagnosis.statistical_filters[b]

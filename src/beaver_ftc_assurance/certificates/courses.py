@@ -21,9 +21,9 @@ from beaver_ftc.diagnosis import TYPE_ROWS as TYPES
 from beaver_ftc.diagnosis import Actuator, FaultTypesConfig
 from beaver_ftc.scenario import Scenario
 from beaver_ftc_assurance.certificates.history import Document, History
-from beaver_ftc_assurance.certificates.inequality import Hypothesis, theta_bounds_by_frame
+from beaver_ftc_assurance.certificates.inequality import Hypothesis
 from beaver_ftc_assurance.certificates.kinds import STUCK, hypothesis_of_type, travel_rad
-from beaver_ftc_assurance.certificates.tape import Tape
+from beaver_ftc_assurance.certificates.search import theta_bounds_by_frame
 
 MIN_POSITION_DIFFERENCE_RAD = 1e-9  # a smaller difference between two positions is rounding
 Pair = tuple[float, float]  # greater, less: rad, or frames
@@ -243,38 +243,30 @@ RULES: dict[str, Callable[[SurfaceBounds], Document | None]] = {
 }  # fmt: skip
 
 
-def evidence(
-    scenario: Scenario, tape: Tape, history: History, surface: int, fault_type: int, alarm_frame: int
-) -> Document | None:
+def evidence(scenario: Scenario, history: History, surface: int, fault_type: int) -> Document | None:
     """The fields of the statement that excludes a fault type on a surface by its course; None if there is no
     such statement. Both signs are tried, unless the type has a direction of its own."""
-    held = hypothesis_of_type(tape, surface, STUCK)
+    held = hypothesis_of_type(history, surface, STUCK)
     fault_type_row = TYPES[fault_type]
     for sign in (fault_type_row.stop_direction,) if fault_type_row.stop_direction else (1, -1):
-        bounds = _surface_bounds(scenario, tape, history, held, surface, alarm_frame, sign)
+        bounds = _surface_bounds(scenario, held, surface, sign)
         statement = RULES[fault_type_row.frames_test](bounds)
         if statement is not None:
             return history.statement_fields | statement
     return None
 
 
-def _surface_bounds(
-    scenario: Scenario,
-    tape: Tape,
-    history: History,
-    held: Hypothesis,
-    surface: int,
-    alarm_frame: int,
-    sign: int,
-) -> SurfaceBounds:
+def _surface_bounds(scenario: Scenario, held: Hypothesis, surface: int, sign: int) -> SurfaceBounds:
     """The bounds of the frames from the alarm on in which the diagnosis has tested types. held: hypothesis by
     which a frame bounds the position: theta is the position p, its offset is -G u and its slope G, so that
     the command is u = -offset / slope. sign: 1 or -1, by which positions are multiplied.
     """
-    frames = np.arange(alarm_frame, tape.end - 1)
+    history = held.history
+    tape = history.tape
+    frames = np.arange(history.alarm, tape.end - 1)
     diagnosis = tape.last.diagnosis
-    tape_rows = slice(alarm_frame - tape.first, tape.end - 1 - tape.first)
-    lower, upper, _ = theta_bounds_by_frame(held, history, frames)
+    tape_rows = slice(history.alarm - tape.first, tape.end - 1 - tape.first)
+    lower, upper, _ = theta_bounds_by_frame(held, frames)
     if sign < 0:
         lower, upper = -upper, -lower
     slope = held.slope[tape_rows]
@@ -292,7 +284,7 @@ def _surface_bounds(
         tape_rows.start + 1 : tape_rows.stop + 1, surface
     ]
     return SurfaceBounds(
-        alarm_frame, sign, lower, upper, command, axis_commands, command_range,
+        history.alarm, sign, lower, upper, command, axis_commands, command_range,
         is_unexplained=history.is_unexplained(frames),
         max_order=orders[:, 2 if single else 1 :].max(axis=1),
         stops=np.sort(sign * np.array(travel_rad(tape, surface))), held=held,

@@ -48,12 +48,13 @@ class DeclaredErrors:
 @dataclass(frozen=True)
 class History:
     """Columns of a log, (rows, 3) by axis: measured body rates x rad/s; acceleration F of the design model
-    and bound eta_bar on its error, rad/s2, of the frame that ends with the row.
+    and bound eta_bar on its error, rad/s2, of the frame that ends with the row; and what was recorded beside
+    the log.
 
-    row_dt: time between two rows, s. instants: number of JSBSim frames in this time. If gyros are noisy,
-    types are tested by blocks of `length` rows (diagnosis/types/records.py); the first block begins with row
-    `begin`. A block counts as one frame of several instants. Its bound has the noise of the gyros at its two
-    ends only.
+    row_dt: time between two rows, s. instants: number of JSBSim frames in this time. alarm: frame of the
+    alarm. tape: recorded quantities of the frames around it. If gyros are noisy, types are tested by blocks
+    of `length` rows (diagnosis/types/records.py); the first block begins with row `begin`. A block counts as
+    one frame of several instants. Its bound has the noise of the gyros at its two ends only.
     """
 
     row_dt: float
@@ -62,6 +63,8 @@ class History:
     F: np.ndarray
     eta_bar: np.ndarray
     declared: DeclaredErrors
+    tape: Tape
+    alarm: int
     length: int = 1
     begin: int = 0
 
@@ -227,12 +230,15 @@ def declared_errors_of(frame: FrameReadout) -> DeclaredErrors:
     )  # fmt: skip
 
 
-def in_blocks(tape: Tape, history: History, alarm_frame: int) -> tuple[Tape, History, int]:
-    """Tape, history and frame of the alarm by blocks, the same blocks by which the diagnosis tested types.
+def in_blocks(history: History) -> History:
+    """The same history by the blocks by which the diagnosis tested types; itself if it tested them by frames.
     The tape begins with the first whole block in it."""
+    tape = history.tape
     diagnosis = tape.alarm.diagnosis
     length = diagnosis.types_config.frames_per_block
-    begin = (alarm_frame + 1 - diagnosis.n_frames_in_block_so_far) % length
+    if length == 1:
+        return history
+    begin = (history.alarm + 1 - diagnosis.n_frames_in_block_so_far) % length
     blocks = replace(history, length=length, begin=begin)
     first_block = ceil((tape.first - begin) / length)
     skipped = begin + first_block * length - tape.first
@@ -243,8 +249,8 @@ def in_blocks(tape: Tape, history: History, alarm_frame: int) -> tuple[Tape, His
         for name, values in tape.kept.items()
     }
     block_tape = replace(tape, first=first_block, frames=(tape.frames - skipped) // length, kept=kept)
-    alarm_block = max(ceil((alarm_frame - begin) / length), 1)  # block 0 has no rates from before it
-    return block_tape, blocks, alarm_block
+    alarm_block = max(ceil((history.alarm - begin) / length), 1)  # block 0 has no rates from before it
+    return replace(blocks, tape=block_tape, alarm=alarm_block)
 
 
 def log_rows_of(statement: Document, span: Document) -> np.ndarray:

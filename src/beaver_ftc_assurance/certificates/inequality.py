@@ -1,4 +1,4 @@
-"""The inequality of an alarm or of an exclusion, and the search for it.
+"""The inequality of an alarm or of an exclusion; search.py has those that are tried.
 
     c_1 (d_1 . E_1[k_1]) + c_2 (d_2 . E_2[k_2]) + ... > the largest value under hypothesis and declared errors
 
@@ -11,10 +11,10 @@ Letters: nu innovation and eta_bar its declared bound (frames, 3) rad/s2; h, Z, 
 i.e. between h + theta Z - r and h + theta Z + r, rad/s2.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
-from itertools import combinations, compress
-from math import exp, inf, isinf
+from itertools import compress
+from math import exp, isinf
 
 import numpy as np
 
@@ -36,7 +36,7 @@ MEMORY_TIME_CONSTANTS = 16.0  # a filter forgets an innovation after this time: 
 @dataclass(frozen=True)
 class Hypothesis:
     """A fault's effect on the innovation: offset + theta slope, within +-spread, rad/s2; theta in
-    [theta_low, theta_high]. Arrays (frames, 3), from frame first_frame on, before which none is kept.
+    [theta_low, theta_high]. Arrays (frames, 3), of the frames of the history's tape: none is kept before.
 
     theta:
         any                       in each frame any value of the range, or the fault is absent
@@ -47,7 +47,7 @@ class Hypothesis:
     axes: axes of the innovation on which the hypothesis is tested.
     """
 
-    first_frame: int
+    history: History
     offset: np.ndarray
     slope: np.ndarray
     spread: np.ndarray
@@ -55,6 +55,11 @@ class Hypothesis:
     theta_high: float
     theta: str = ANY
     axes: tuple[int, ...] = (0, 1, 2)
+
+    @property
+    def first_frame(self) -> int:
+        """The first frame of which the effect is kept."""
+        return self.history.tape.first
 
     def along(self, direction: np.ndarray, frames: slice) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Offset h, slope Z and spread r (frames,) along a direction (3,) in these frames."""
@@ -70,10 +75,10 @@ class Hypothesis:
         return np.where(ends > MIN_EFFECT_RAD_S2, ends, 0.0) + r
 
 
-def no_fault(first_frame: int, n_frames: int) -> Hypothesis:
+def no_fault(history: History) -> Hypothesis:
     """The hypothesis of a healthy aircraft."""
-    zero = np.zeros((n_frames, 3))
-    return Hypothesis(first_frame, zero, zero, zero, 0.0, 0.0)
+    zero = np.zeros((history.tape.frames, 3))
+    return Hypothesis(history, zero, zero, zero, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -97,7 +102,6 @@ class Inequality:
 
     terms: list[Term]
     hypothesis: Hypothesis
-    history: History
 
     def statement(self) -> Document | None:
         """The fields of a statement: every number that the inequality needs, and no other. None unless the
@@ -123,7 +127,7 @@ class Inequality:
             if abs(slope) > MIN_SLOPE and not by_theta:  # the end of the range that counts is zero: no effect
                 terms = [{name: entry for name, entry in fields.items() if name != "Z"} for fields in terms]
         ends = dict(compress({"least": hypothesis.theta_low, "most": hypothesis.theta_high}.items(), decides))
-        common = {**self.history.statement_fields, "theta": hypothesis.theta, **ends}
+        common = {**hypothesis.history.statement_fields, "theta": hypothesis.theta, **ends}
         return {**common, "terms": list(terms), "sides": [value, limit]}
 
     def _evaluate(self, term: Term) -> tuple[Document, np.ndarray, tuple[bool, bool]]:
@@ -140,9 +144,9 @@ class Inequality:
         value of the filter at frame first - 1 that the fault can cause. adds (frames,): whether the effect is
         more than rounding."""
         hypothesis = self.hypothesis
-        history = self.history
+        history = hypothesis.history
         d = term.direction
-        dt = self.history.dt
+        dt = history.dt
         start = term.filter_start
         last = term.last_frame
         first = self._first_written_frame(term)
@@ -175,7 +179,7 @@ class Inequality:
     def _fields_of(self, term: Term, rows: slice, before: float, adds: np.ndarray) -> Document:
         """The fields of a term whose frames `rows` are written out. before: largest effect of the fault
         before them, rad/s; adds (frames,): whether the fault's effect is more than rounding."""
-        history = self.history
+        history = self.hypothesis.history
         is_filtered = not isinf(term.pole_per_s)
         fields: Document = {"weight": term.weight, "d": term.direction.tolist()}
         fields |= {"pole_per_s": term.pole_per_s, "since": term.filter_start} if is_filtered else {}
@@ -202,7 +206,7 @@ class Inequality:
         hypothesis = self.hypothesis
         start = term.filter_start
         longest = N_WRITTEN_FRAMES if hypothesis.theta == ANY else last - start
-        remembered = int(MEMORY_TIME_CONSTANTS / (term.pole_per_s * self.history.dt))
+        remembered = int(MEMORY_TIME_CONSTANTS / (term.pole_per_s * hypothesis.history.dt))
         first = last + 1 - max(min(longest, remembered), 1)
         return max(first, start + 1, hypothesis.first_frame + 1)
 
@@ -223,81 +227,7 @@ def _filtered(decay: float, dt: float, effects: np.ndarray, before: float) -> fl
     return float(decay * weights[0] * before + dt * weights @ effects)
 
 
-def first_violated(
-    candidates: Iterable[list[Term]], hypothesis: Hypothesis, history: History
-) -> Document | None:
+def first_violated(candidates: Iterable[list[Term]], hypothesis: Hypothesis) -> Document | None:
     """The statement of the first inequality that the data violate; None if there is none."""
-    statements = (Inequality(terms, hypothesis, history).statement() for terms in candidates if terms)
+    statements = (Inequality(terms, hypothesis).statement() for terms in candidates if terms)
     return next(filter(None, statements), None)
-
-
-def axis_directions(axes: tuple[int, ...]) -> Iterator[np.ndarray]:
-    """Both directions (3,) along each of the axes."""
-    return (way for d in np.eye(3)[[*axes]] for way in (d, 0.0 - d))  # -d would write -0.0
-
-
-def filters(pole_per_s: float, start: int, last: int, axes: tuple[int, ...]) -> Iterator[list[Term]]:
-    """Inequalities of one filter, in both directions along each axis."""
-    return ([Term(d, pole_per_s, start, last)] for d in axis_directions(axes))
-
-
-def single_frame_tests(frame: int, hypothesis: Hypothesis) -> Iterator[list[Term]]:
-    """The inequalities of one frame: along each axis; and for each two axes in the direction, and its
-    opposite, that is perpendicular to the slope, so that theta drops out."""
-    yield from filters(inf, frame - 1, frame, hypothesis.axes)
-    slope = hypothesis.slope[frame - hypothesis.first_frame]
-    for i, j in combinations(hypothesis.axes, 2):
-        if slope[i] or slope[j]:
-            d = np.zeros(3)
-            d[i] = slope[j]
-            d[j] = -slope[i]
-            d /= np.abs(d).max()
-            yield from ([Term(way, inf, frame - 1, frame)] for way in (d, -d))
-
-
-def theta_bounds_by_frame(
-    hypothesis: Hypothesis, history: History, frames: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Bounds on theta by each frame and axis, and the slope from which they follow; (n, 3), for the n frames
-    from the first to the last of `frames`:
-
-        |nu - offset - theta slope| <= bound on |nu| of health + spread
-
-    Infinite, with a slope of 1, in frames that are not among `frames`, on axes on which the hypothesis is not
-    tested, and where the slope is 0.
-    """
-    rows = slice(int(frames[0]), int(frames[-1]) + 1)
-    is_bound = np.zeros((rows.stop - rows.start, 3), bool)
-    is_bound[np.ix_(frames - rows.start, np.array(hypothesis.axes))] = True
-    kept_rows = slice(rows.start - hypothesis.first_frame, rows.stop - hypothesis.first_frame)
-    slope = hypothesis.slope[kept_rows]
-    tolerance = history.innovation_bound(rows) + hypothesis.spread[kept_rows]
-    effect = history.innovation_rad_s2[rows] - hypothesis.offset[kept_rows]
-    is_bound &= slope != 0.0
-    size = np.where(is_bound, np.abs(slope), 1.0)
-    middle = effect * np.sign(slope) / size
-    lower = np.where(is_bound, middle - tolerance / size, -inf)
-    upper = np.where(is_bound, middle + tolerance / size, inf)
-    return lower, upper, np.where(is_bound, slope, 1.0)
-
-
-def constant_theta_tests(hypothesis: Hypothesis, history: History, frames: np.ndarray) -> list[Term]:
-    """The terms of the two frames that bound a constant theta most: the one with the largest lower bound and
-    the one with the least upper bound. The data violate their sum if these bounds contradict one another. A
-    term is left out if the end of the range bounds theta as much; empty without frames.
-    """
-    if not len(frames):
-        return []
-    lower, upper, slope = theta_bounds_by_frame(hypothesis, history, frames)
-    terms = []
-    for place, sign, is_bound in (
-        (np.unravel_index(np.argmax(lower), lower.shape), 1.0, lower.max() > hypothesis.theta_low),
-        (np.unravel_index(np.argmin(upper), upper.shape), -1.0, upper.min() < hypothesis.theta_high),
-    ):
-        if is_bound:  # the term that bounds theta from below, or above
-            frame = int(frames[0] + place[0])
-            direction = np.zeros(3)
-            direction[place[1]] = sign * np.sign(slope[place])
-            weight = 1.0 / (history.dt * abs(float(slope[place])))
-            terms.append(Term(direction, inf, frame - 1, frame, weight))
-    return terms

@@ -7,7 +7,6 @@ by a comparison of many frames (courses.py). `reason_not_certified` says which e
 """
 
 from collections.abc import Iterator
-from math import inf
 
 import numpy as np
 
@@ -16,14 +15,7 @@ from beaver_ftc.diagnosis import TYPE_NAMES
 from beaver_ftc.diagnosis import TYPE_ROWS as TYPES
 from beaver_ftc_assurance.certificates.check_certificate import COURSES, RELATIONS, Relation
 from beaver_ftc_assurance.certificates.history import History
-from beaver_ftc_assurance.certificates.inequality import (
-    ANY,
-    CONSTANT_WHILE_SHOWN,
-    Hypothesis,
-    Term,
-    constant_theta_tests,
-    single_frame_tests,
-)
+from beaver_ftc_assurance.certificates.inequality import ANY, CONSTANT_WHILE_SHOWN, Hypothesis
 from beaver_ftc_assurance.certificates.tape import KEPT_AFTER_EVENT_S, MAX_FRAMES_AFTER_ALARM, Tape
 
 EXCLUDED_BY_MANY_FRAMES = "frames of quiet excluded it, or what several say together"
@@ -107,7 +99,7 @@ def type_definition_columns(tape: Tape, surface: str, s: int, kind: int) -> dict
     return {f"{name}_{column}": float(value) for column, value in relation._asdict().items()}
 
 
-def hypothesis_of_type(tape: Tape, surface: int, fault_type: int) -> Hypothesis:
+def hypothesis_of_type(history: History, surface: int, fault_type: int) -> Hypothesis:
     """The effect G (p - u) on the innovation of a fault of this type on a surface; p: position of the
     surface, u: command in effect, rad; G: effectiveness. By the relation of the type
 
@@ -118,6 +110,7 @@ def hypothesis_of_type(tape: Tape, surface: int, fault_type: int) -> Hypothesis:
     its slope.
     """
     row = TYPES[fault_type]
+    tape = history.tape
     diagnosis = tape.alarm.diagnosis
     assert row.deflection_relation is not None
     gain, theta_is_share, theta_span = row.deflection_relation
@@ -126,9 +119,7 @@ def hypothesis_of_type(tape: Tape, surface: int, fault_type: int) -> Hypothesis:
     G = tape.slope[:, e]
     spread = tape.spread[:, e]
     axes = diagnosis.estimators[e].active_axes
-    if (
-        diagnosis.types_config.frames_per_block > 1
-    ):  # over a block, the axes weigh a varying position differently
+    if diagnosis.types_config.frames_per_block > 1:  # over a block, axes weigh a varying position differently
         axes = (diagnosis.layout.dominant_axis_by_surface[surface],)
     low, high = theta_span(*travel_rad(tape, surface))
     offset = (gain - 1.0) * Gu
@@ -139,26 +130,4 @@ def hypothesis_of_type(tape: Tape, surface: int, fault_type: int) -> Hypothesis:
         low = 0.0
         high = 0.0
     theta = CONSTANT_WHILE_SHOWN if row.has_constant_parameter else ANY
-    return Hypothesis(tape.first, offset, slope, spread, low, high, theta, axes)
-
-
-def candidate_inequalities(
-    hypothesis: Hypothesis, history: History, alarm_frame: int, last_frame: int
-) -> Iterator[list[Term]]:
-    """Inequalities that may exclude a hypothesis by frames up to last_frame: of each of the last two frames,
-    if theta may change in each; otherwise, of the frames since the alarm that health does not explain, two
-    that one theta does not explain, or one of the last three. None needs a frame before the hypothesis's
-    first, because no effect is known there.
-    """
-    if hypothesis.theta == ANY:
-        for frame in range(max(last_frame - 1, hypothesis.first_frame), last_frame + 1):
-            yield from single_frame_tests(frame, hypothesis)
-        return
-    frames = np.arange(max(alarm_frame, hypothesis.first_frame), last_frame + 1)
-    if not len(frames):
-        return
-    frames = frames[history.is_unexplained(frames)]
-    if hypothesis.slope.any():
-        yield constant_theta_tests(hypothesis, history, frames)
-    for frame in frames[-3:].tolist():
-        yield from ([Term(sign * d, inf, frame - 1, frame)] for d in np.eye(3) for sign in (1.0, -1.0))
+    return Hypothesis(history, offset, slope, spread, low, high, theta, axes)

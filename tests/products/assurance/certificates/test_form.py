@@ -72,11 +72,12 @@ def test_the_page_lists_the_fields_that_the_checker_accepts():
 
 def test_an_oscillation_is_excluded_once_one_side_lasts_longer_than_half_of_its_period():
     """Half a period, 0.3 s, is 3 blocks: beyond the command by 0.05 rad and more from block 3 on."""
+    kept = SimpleNamespace(tape=SimpleNamespace(first=0, frames=10))
     lower = np.where(np.arange(10) >= 3, 0.12 + 0.01 * np.arange(10), 0.0)
     bounds = courses.SurfaceBounds(
         first_frame=0, sign=1, lower=np.column_stack([lower, np.zeros(10)]), upper=lower,
         command=np.full(10, 0.1), axis_commands=lower, command_range=lower,
-        is_unexplained=np.ones(10, bool), max_order=lower, stops=lower, held=no_fault(0, 10), actuator=None,
+        is_unexplained=np.ones(10, bool), max_order=lower, stops=lower, held=no_fault(kept), actuator=None,
         config=SimpleNamespace(block_duration_s=0.1), slowest_rad_s=pi / 0.3,
     )  # fmt: skip
     found = courses.RULES["swing"](bounds)

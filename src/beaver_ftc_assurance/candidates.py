@@ -73,9 +73,8 @@ def situation_of(tape: Tape, scenario: Scenario, rate: float) -> Situation:
     aircraft = scenario.airframe
     dt = 1.0 / scenario.rate_hz
     bound = frame.diagnosis.declared_bounds
-    declared = declared_errors_of(frame)
     actuators = frame.actuators
-    coupled = declared.inertia_coupling * rate**2
+    coupled = declared_errors_of(frame).c * rate**2
     return Situation(
         G=frame.mean_G, u=frame.expected_u_rad, x=frame.rates_rad_s, rate=rate,
         bound=bound.eta_bar_rad_s2 + coupled + 2.0 * bound.changing_gyro_error_bound_rad_s / dt,
@@ -134,19 +133,16 @@ def distinguish(fault_a: Candidate, fault_b: Candidate, at: Situation, names: Se
     """
     targets: dict[int, float] = {}
     needs: Document = {}
-    if fault_a.surface == fault_b.surface and at.in_blocks:
-        return _none("with noisy gyros, blocks of frames distinguish types, not single frames", needs)
+    orders = [(fault_a, fault_b), (fault_b, fault_a)]
     if fault_a.surface == fault_b.surface:
-        requirements = [(fault_a.surface, *_target_of_types(fault_a, fault_b, at))]
-    else:
-        requirements = [
-            (a.surface, *_target_of_surface(a, b, at)) for a, b in ((fault_a, fault_b), (fault_b, fault_a))
-        ]
-    for s, target, numbers in requirements:
-        needs[names[s]] = numbers
+        del orders[1]
+        if at.in_blocks:
+            return _none("with noisy gyros, blocks of frames distinguish types, not single frames", needs)
+    for fault, other in orders:
+        target, needs[names[fault.surface]] = _target(fault, other, at)
         if target is None:
-            return _none(numbers["because"], needs)
-        targets[s] = target
+            return _none(needs[names[fault.surface]]["because"], needs)
+        targets[fault.surface] = target
     solution = doublet(targets, at)
     if solution is None:
         text = f"no doublet within {LONGEST_S:g} s keeps the rates below {degrees(at.rate):g} deg/s"
@@ -168,55 +164,48 @@ def _none(because: str, needs: Document) -> Document:
     return {"separates": False, "because": because, "needs": needs}
 
 
-def _target_of_types(fault_a: Candidate, fault_b: Candidate, at: Situation) -> tuple[float | None, Document]:
-    """The deflection nearest to the present one at which the positions by two types on a surface and by
-    health all differ; None if there is none; and the numbers of `_nearest_target`.
+def _target(fault: Candidate, other: Candidate, at: Situation) -> tuple[float | None, Document]:
+    """The deflection nearest to the present one with difference > room, None if there is none; and the
+    numbers that decide it, with the reason if there is none. On one surface s, difference, rad, is the least
+    distance between the positions by the two types and the command; otherwise it is the distance of surface s
+    of `fault` from its command, which must show where the surface of `other` has no effect.
 
-        gap > room,    room = least over the axes i of 2 M B_i / |G_is|
+        room = least over the directions d of 2 M |d|.B / |d.G_s|
 
-    gap (GRID + 1,): least distance, rad, between two of the three positions at each deflection.
+    d: the axes on which s has an effect, or the directions of `_blind_to`. room is infinite without one.
     """
-    s = fault_a.surface
-    room = min(
-        (2.0 * MARGIN * B / abs(g) for B, g in zip(at.bound, at.G[:, s], strict=True) if g), default=inf
+    s = fault.surface
+    G_s = at.G[:, s]
+    # over the whole travel, and the present one
+    u = np.append(np.linspace(at.stops[0, s], at.stops[1, s], GRID), np.clip(at.u[s], *at.stops[:, s]))
+    difference = fault.off(u)  # health must not explain the frame
+    directions = _blind_to(other.surface, at, s)
+    too_small = (
+        "the surface must differ from its command by more than {:.3g} deg; within the travel, it differs by "
+        "{:.3g} deg at most"
     )
-    u = _deflections(at, s)
-    low, high = fault_a.deflection(u)
-    low_b, high_b = fault_b.deflection(u)
-    gap = np.maximum(low - high_b, low_b - high)
-    # Health must not explain the frame.
-    gap = np.minimum(gap, np.minimum(fault_a.off(u), fault_b.off(u)))
-    return _nearest_target(
-        u, gap, s, at, room,
-        "the positions must differ from each other and from the command by more than {room:.3g} deg; within "
-        "the travel, they differ by {largest:.3g} deg at most",
-    )  # fmt: skip
-
-
-def _target_of_surface(
-    fault_a: Candidate, fault_b: Candidate, at: Situation
-) -> tuple[float | None, Document]:
-    """The deflection nearest to the present one at which fault_a, on surface a, shows in a direction in which
-    surface b of the other fault has no effect; None if there is none; and the numbers of `_nearest_target`.
-
-        distance from the command > room,    room = least over the directions d of 2 M |d|.B / |d.G_a|
-    """
-    a = fault_a.surface
-    b = fault_b.surface
-    room = min(
-        (2.0 * MARGIN * np.abs(d) @ at.bound / abs(d @ at.G[:, a]) for d in _blind_to(b, at, a)), default=inf
-    )
-    u = _deflections(at, a)
-    return _nearest_target(
-        u, fault_a.off(u), a, at, room,
-        "the surface must differ from its command by more than {room:.3g} deg; within the travel, it differs "
-        "by {largest:.3g} deg at most",
-    )  # fmt: skip
-
-
-def _deflections(at: Situation, s: int) -> np.ndarray:
-    """Deflections that are tried, (GRID + 1,) rad: over the whole travel, and the present one."""
-    return np.append(np.linspace(at.stops[0, s], at.stops[1, s], GRID), np.clip(at.u[s], *at.stops[:, s]))
+    if other.surface == s:
+        low, high = fault.deflection(u)
+        low_b, high_b = other.deflection(u)
+        gap = np.maximum(low - high_b, low_b - high)
+        difference = np.minimum(gap, np.minimum(difference, other.off(u)))
+        directions = (d for d in np.eye(3) if d @ G_s)
+        too_small = (
+            "the positions must differ from each other and from the command by more than {:.3g} deg; within "
+            "the travel, they differ by {:.3g} deg at most"
+        )
+    room = min((2.0 * MARGIN * np.abs(d) @ at.bound / abs(d @ G_s) for d in directions), default=inf)
+    is_known = room < inf
+    numbers = {
+        "at_least_deg": degrees(room) if is_known else None, "at_most_deg": degrees(difference.max()),
+        "now_deg": degrees(at.u[s]),
+    }  # fmt: skip
+    allowed = u[difference > room]
+    if not allowed.size:
+        text = too_small.format(degrees(room), numbers["at_most_deg"])
+        return None, numbers | {"because": text if is_known else "no direction shows the fault"}
+    target = float(allowed[np.argmin(np.abs(allowed - at.u[s]))])
+    return target, numbers | {"target_deg": degrees(target)}
 
 
 def _blind_to(b: int, at: Situation, a: int) -> Iterator[np.ndarray]:
@@ -226,20 +215,3 @@ def _blind_to(b: int, at: Situation, a: int) -> Iterator[np.ndarray]:
     for d in (*np.cross(np.eye(3), G_b), *np.eye(3)[G_b == 0.0]):
         if abs(d @ at.G[:, a]) > 1e-9 * np.abs(d).max():
             yield d
-
-
-def _nearest_target(
-    u: np.ndarray, difference: np.ndarray, s: int, at: Situation, room: float, too_small: str
-) -> tuple[float | None, Document]:
-    """The deflection of u (n,) nearest to the present one with difference > room, None if there is none; and
-    the numbers that decide it. difference (n,), rad: at each of u. room, rad: infinite if no direction shows
-    the fault. too_small: the reason if room is finite, with the places {room} and {largest} (difference)."""
-    largest_deg = degrees(difference.max())
-    is_enough = difference > room
-    numbers: Document = {"at_least_deg": degrees(room) if room < inf else None}
-    numbers |= {"at_most_deg": largest_deg, "now_deg": degrees(at.u[s])}
-    if not is_enough.any():
-        text = too_small.format(room=degrees(room), largest=largest_deg)
-        return None, numbers | {"because": text if room < inf else "no direction shows the fault"}
-    target = float(u[is_enough][np.argmin(np.abs(u[is_enough] - at.u[s]))])
-    return target, numbers | {"target_deg": degrees(target)}

@@ -319,7 +319,7 @@ class _Flight:
         if not all("looks" in statement or "missing" in statement for statement in statements):
             fields["dt_s"] = self.history.dt
         if spans:
-            fields |= {"instants": self.scenario.substeps, "omega_E": self.history.declared.earth_rad_s}
+            fields |= {"instants": self.scenario.substeps, "omega_E": self.history.declared.omega_E}
         return fields
 
 

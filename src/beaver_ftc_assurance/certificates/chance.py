@@ -104,25 +104,17 @@ def _largest_score(blocks: Sequence[StatisticalBlock]) -> tuple[int, int]:
 def _likelihood_ratio(history: History, test: tuple[int, int, int], rows: range) -> LikelihoodRatio:
     """The ratio of a test (b, h, slot) over the given rows.
 
-    before, now: quantities at the end of the row before each row, and of the row itself. The detector
-    prepares noise, decay, bound and rate of change of the drift at the end of the row before; it fills inputs
-    and responses in the row itself. moved: positions in the block of the axes (`_affected_axes`). states:
-    positions of their rate errors, then of their drifts, in the states of the block. known: numbers of the
-    declared constants that act on these axes.
+    moved: positions in the block of the axes (`_affected_axes`). states: positions of their rate errors, then
+    of their drifts, in the states of the block. known: numbers of the declared constants that act on these
+    axes.
     """
     b, h, slot = test
     tape = history.tape
     dt = history.dt
     diagnosis = tape.alarm.diagnosis
     block = diagnosis.statistical_filters[b]
-    span = slice(rows[0] - 1 - tape.first, rows[-1] + 1 - tape.first)
-    recorded = {name: tape.filters[name][span] for name in ("bounded", "air", "leap")}
-    recorded |= {name: tape.filters[name][span, b] for name in RECORDED_BLOCK_FIELDS}
-    recorded["signature"] = tape.filters["signature"][span, b, h]
-    before, now = (
-        {name: values[part] for name, values in recorded.items()} for part in (np.s_[:-1], np.s_[1:])
-    )
-    moved = _affected_axes(recorded, now["signature"], len(block.axis_indices))
+    before, now = _before_and_now(tape, b, h, rows)
+    moved = _affected_axes(before, now, len(block.axis_indices))
     states = [*moved, *(2 + i for i in moved)]
     axes = [block.axis_indices[i] for i in moved]
     tolerance = block.regressor_coefficient_error_bound
@@ -150,6 +142,21 @@ def _likelihood_ratio(history: History, test: tuple[int, int, int], rows: range)
         tolerance=tolerance[known], R=before["R_y"][0, moved], Y=Y, P=P, first=rows[0], series=series,
         innovation=history.innovation_rad_s2[rows[0] : rows[-1] + 1, axes], dt=dt,
     )  # fmt: skip
+
+
+Quantities = dict[str, np.ndarray]
+
+
+def _before_and_now(tape: Tape, b: int, h: int, rows: range) -> tuple[Quantities, Quantities]:
+    """Recorded quantities of hypothesis h of block b: at the end of the row before each row, and of the row
+    itself, (rows, ...). The detector prepares noise, decay, bound and rate of change of the drift at the end
+    of the row before; it fills inputs and responses in the row itself."""
+    span = slice(rows[0] - 1 - tape.first, rows[-1] + 1 - tape.first)
+    recorded = {name: tape.filters[name][span] for name in ("bounded", "air", "leap")}
+    recorded |= {name: tape.filters[name][span, b] for name in RECORDED_BLOCK_FIELDS}
+    recorded["signature"] = tape.filters["signature"][span, b, h]
+    before, now = ({name: x[part] for name, x in recorded.items()} for part in (np.s_[:-1], np.s_[1:]))
+    return before, now
 
 
 def _a_frame_later(drift: np.ndarray) -> np.ndarray:
@@ -182,7 +189,8 @@ def _states_of(
     return Y, 0.5 * (P + P.T)  # exactly symmetric, as the checker requires
 
 
-def _affected_axes(recorded: dict[str, np.ndarray], signature: np.ndarray, n: int) -> list[int]:
+def _affected_axes(before: Quantities, now: Quantities, n: int) -> list[int]:
     """Positions, in a block of n axes, of the axes that the fault moves; both if the axes are correlated."""
-    together = n > 1 and any(recorded[name][..., 0, 1].any() for name in ("P_xx", "P_xd", "P_dd", "Q_d"))
-    return [i for i in range(n) if together or signature[:, i].any()]
+    covariances = ("P_xx", "P_xd", "P_dd", "Q_d")
+    together = n > 1 and any(part[name][..., 0, 1].any() for part in (before, now) for name in covariances)
+    return [i for i in range(n) if together or now["signature"][:, i].any()]

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import ceil, nan
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,24 +26,25 @@ ROUNDING_SHARE = 4e-15  # a smaller share of a bound is rounding
 AVERAGED_QUANTITIES = "offset", "slope", "spread"
 
 
-@dataclass(frozen=True)
-class DeclaredErrors:
-    """Declared errors that the bound on the model's error contains, by axis (3,).
+class DeclaredErrors(NamedTuple):
+    """Declared errors that the bound on the model's error contains, by axis (3,), under their letters in the
+    certificate (docs/explanation/certificates.md, "The fields").
 
-    inertia_coupling: largest error of the model's coefficient of a product of two rates, 1/rad.
-    constant_rad_s2: constant part of the bound. earth_rad_s: rate of the Earth, which the model leaves out.
-    earth_gain: bound on the coefficients of products with the Earth's rate, 1/rad, at least 1
-    (`declared_errors_of`). The error of a gyro is at most gyro_offset_rad_s + gyro_slope |rate|;
-    gyro_constant_rad_s is the part of it that does not change.
+    c        1/rad    largest error of the model's coefficient of a product of two rates
+    b        rad/s2   constant part of the bound
+    g        1/rad    bound on the coefficients of products with the Earth's rate (`declared_errors_of`)
+    o, m     rad/s, 1 the error of a gyro is at most o + m |rate|
+    B        rad/s    the part of o that does not change
+    omega_E  rad/s    rate of the Earth, which the model leaves out; a scalar
     """
 
-    inertia_coupling: np.ndarray
-    constant_rad_s2: np.ndarray
-    earth_rad_s: float
-    earth_gain: np.ndarray
-    gyro_offset_rad_s: np.ndarray
-    gyro_constant_rad_s: np.ndarray
-    gyro_slope: np.ndarray
+    c: np.ndarray
+    b: np.ndarray
+    g: np.ndarray
+    o: np.ndarray
+    B: np.ndarray
+    m: np.ndarray
+    omega_E: float
 
 
 @dataclass(frozen=True)
@@ -109,22 +111,16 @@ class History:
 
     @cached_property
     def gyro_error_change_rad_s(self) -> np.ndarray:
-        """n of docs/explanation/detection.md, "Changing error of a gyro", (frames, 3):
-
-            n = offset - constant + slope |largest true rate|
-
-        offset, constant, slope: declared errors of the gyros.
-        """
-        declared = self.declared
-        x = self.rates_rad_s
-        changing = declared.gyro_offset_rad_s - declared.gyro_constant_rad_s
-        return np.asarray(changing + declared.gyro_slope * self._largest(x))
+        """n of docs/explanation/detection.md, "Changing error of a gyro", (frames, 3): n = o - B + m w, with
+        the largest true rates w."""
+        errors = self.declared
+        return np.asarray(errors.o - errors.B + errors.m * self._largest(self.rates_rad_s))
 
     def _largest(self, x: np.ndarray) -> np.ndarray:
-        """Bound on |true rate| by readings x, (n, 3): |x| + (offset + slope |x|) / (1 - slope)."""
-        offset = self.declared.gyro_offset_rad_s
-        slope = self.declared.gyro_slope
-        return np.asarray(np.abs(x) + (offset + slope * np.abs(x)) / (1.0 - slope))
+        """w, bound on |true rate| by readings x, (n, 3): |x| + (o + m |x|) / (1 - m)."""
+        o = self.declared.o
+        m = self.declared.m
+        return np.asarray(np.abs(x) + (o + m * np.abs(x)) / (1.0 - m))
 
     @cached_property
     def innovation_rad_s2(self) -> np.ndarray:
@@ -144,17 +140,16 @@ class History:
     @cached_property
     def unstated_bound_rad_s2(self) -> np.ndarray:
         """The part of eta_bar that does not follow from the declared errors, (frames, 3), with w the largest
-        true rates at the row before, g the earth_gain and Omega the rate of the Earth:
+        true rates at the row before:
 
-            eta_bar - (inertia_coupling (products of w) + constant
-                       + Omega ((1 + g) sum w + g Omega) + ROUNDING_RAD_S2) / instants
+            eta_bar - (c (products of w) + b + omega_E ((1 + g) sum w + g omega_E) + rounding) / instants
         """
-        declared = self.declared
-        rates = self._largest(self.x)
-        earth = declared.earth_rad_s
-        gain = declared.earth_gain
-        by_earth = earth * ((1.0 + gain) * rates.sum(axis=1, keepdims=True) + gain * earth) + ROUNDING_RAD_S2
-        stated = declared.inertia_coupling * self.products() + declared.constant_rad_s2 + by_earth
+        errors = self.declared
+        g = errors.g
+        omega_E = errors.omega_E
+        w = self._largest(self.x)
+        by_earth = omega_E * ((1.0 + g) * w.sum(axis=1, keepdims=True) + g * omega_E) + ROUNDING_RAD_S2
+        stated = errors.c * self.products() + errors.b + by_earth
         unstated = self.eta_bar - _row_before(stated) * (1.0 / self.instants)
         return self.mean(unstated[self.begin :])
 
@@ -172,8 +167,7 @@ class History:
     def with_constant_gyro_errors_on(self, axes: np.ndarray) -> "History":
         """The same history, but with a constant part of the gyro error only on the axes where `axes` (3,) is
         1; on the other axes, the whole error may change."""
-        constant = self.declared.gyro_constant_rad_s * axes
-        return replace(self, declared=replace(self.declared, gyro_constant_rad_s=constant))
+        return replace(self, declared=self.declared._replace(B=self.declared.B * axes))
 
     def declared_fields(self, rows: np.ndarray | None) -> Document:
         """The field `declared` of a certificate, by letter and axis (docs/explanation/certificates.md, "The
@@ -181,15 +175,12 @@ class History:
         of these rows; c, b and g without rows. rows: those of all terms and bounds, None if there are
         none."""
         errors = self.declared
-        gyro = {"o": errors.gyro_offset_rad_s, "B": errors.gyro_constant_rad_s, "m": errors.gyro_slope}
+        gyro = {name: getattr(errors, name) for name in "oBm"}
         if rows is None:
             return _by_axis(gyro | dict.fromkeys("cbg", np.zeros(len(AXES))))
-        added = errors.inertia_coupling * self.products()[rows - 1] * (1.0 / self.instants)
+        added = errors.c * self.products()[rows - 1] * (1.0 / self.instants)
         decides = (added > ROUNDING_SHARE * self.eta_bar[rows]).any(axis=0)
-        gain = errors.earth_gain * (errors.earth_rad_s > 0.0)
-        return _by_axis(
-            gyro | {"c": errors.inertia_coupling * decides, "b": errors.constant_rad_s2, "g": gain}
-        )
+        return _by_axis(gyro | {"c": errors.c * decides, "b": errors.b, "g": errors.g * (errors.omega_E > 0)})
 
 
 def _row_before(values: np.ndarray) -> np.ndarray:
@@ -209,7 +200,7 @@ def declared_errors_of(frame: FrameReadout) -> DeclaredErrors:
     """The declared errors in a flight's record, with the coefficients of inertia that they multiply.
 
     The Earth's rate adds to the body rates in pdot = Ppq p q + Pqr q r, qdot = Qpp p^2 + Qpr p r + Qrr r^2
-    and rdot = Rpq p q + Rqr q r. earth_gain is the size of these coefficients in sum, of a square twice:
+    and rdot = Rpq p q + Rqr q r. g is the size of these coefficients in sum, of a square twice:
     |Ppq| + |Pqr|, |Qpr| + 2 max(|Qpp|, |Qrr|), |Rpq| + |Rqr|, at least 1.
     """
     bound = frame.diagnosis.declared_bounds
@@ -221,12 +212,10 @@ def declared_errors_of(frame: FrameReadout) -> DeclaredErrors:
         size["Rpq"] + size["Rqr"],
     )
     return DeclaredErrors(
-        inertia_coupling=bound.inertia_coupling_error_share * np.abs([inertia.Pqr, inertia.Qpr, inertia.Rpq]),
-        constant_rad_s2=bound.constant_error_rad_s2,
-        earth_rad_s=bound.earth_rate_rad_s, earth_gain=np.maximum(gains, 1.0),
-        gyro_offset_rad_s=bound.gyro_error_bound_at_rest_rad_s,
-        gyro_constant_rad_s=bound.constant_gyro_error_bound_rad_s,
-        gyro_slope=bound.gyro_error_bound_per_rate,
+        c=bound.inertia_coupling_error_share * np.abs([inertia.Pqr, inertia.Qpr, inertia.Rpq]),
+        b=bound.constant_error_rad_s2, g=np.maximum(gains, 1.0), o=bound.gyro_error_bound_at_rest_rad_s,
+        B=bound.constant_gyro_error_bound_rad_s, m=bound.gyro_error_bound_per_rate,
+        omega_E=bound.earth_rate_rad_s,
     )  # fmt: skip
 
 

@@ -127,7 +127,6 @@ def test_the_checker_accepts_a_flights_certificate(name):
     stated = {said["column"] for said in certificate["statements"]} - {None}
     left_out = {said["column"] for said in certificate["without"]} - {None}
     assert stated | left_out == set_at_end(log)
-    assert all(said["column"] for said in certificate["statements"])
     assert left_out == set() or name in ("gyros", *CHANCE)  # with exact gyros all of a surface is certified
     assert bool(stated) == bool(log["detected"].any())
     assert len(as_text(certificate)) <= 200_000

@@ -118,7 +118,7 @@ def figures_in_short():
     test_figures.py and test_files.py have them drawn.
     """
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("beaver_ftc.results.figures.save", _save_in_short)
+        patch.setattr("beaver_ftc.results.pictures.save", _save_in_short)
         yield
 
 

@@ -95,7 +95,8 @@ def _is_a_result(folder: Path) -> bool:
 def _kind_by_its_keys(path: Path, named: bool, all_of_them: bool) -> "type[FlownFile] | None":
     """A file is read as `run` reads it. What is there to be collected and cannot be read is, so that it fails
     and is not missed; a file that is named alone may be another tool's."""
-    from beaver_ftc.documents.validation import ScenarioError, parse_document
+    from beaver_ftc.documents.report import ScenarioError
+    from beaver_ftc.documents.validation import parse_document
     from beaver_ftc.scenario.builtin import read_file
 
     try:

@@ -5,8 +5,8 @@ import os
 import pytest
 
 from beaver_ftc.documents import files
+from beaver_ftc.documents.dotted import parse_key, with_values
 from beaver_ftc.documents.files import UnreadableError, put_folder, read_bytes, read_text
-from beaver_ftc.documents.validation import parse_key, with_values
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,8 @@ from beaver_ftc.documents.document import (
     number,
 )
 from beaver_ftc.documents.errors import nearest, suggestion
-from beaver_ftc.documents.validation import ScenarioError, parse_document, validate
+from beaver_ftc.documents.report import ScenarioError
+from beaver_ftc.documents.validation import parse_document, validate
 
 
 class Ant(Section):

@@ -7,7 +7,7 @@ import pytest
 
 from beaver_ftc.aircraft.aircraft import read
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.documents.validation import ScenarioError
+from beaver_ftc.documents.report import ScenarioError
 from beaver_ftc.plant import admission
 from beaver_ftc.scenario import airframe
 from trainer import TRAINER, change

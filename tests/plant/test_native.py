@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.documents import files
+from beaver_ftc.documents import trials
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.plant import addresses, channels
 from beaver_ftc.plant.channels import NodeBank
@@ -69,7 +69,7 @@ WRONG = {
 @needs_native
 @pytest.mark.parametrize("wrong", WRONG.values(), ids=list(WRONG))
 def test_another_layout_is_recognised_without_a_crash(monkeypatch, tmp_path, wrong):
-    monkeypatch.setattr(files, "cache_base", lambda: tmp_path)
+    monkeypatch.setattr(trials, "cache_base", lambda: tmp_path)
     assert not addresses.is_proved.__wrapped__(addresses.LAYOUT._replace(**wrong))
 
 

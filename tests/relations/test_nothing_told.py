@@ -15,7 +15,7 @@ import pytest
 
 import beaver_ftc as bf
 from beaver_ftc.loop.loop import Loop
-from beaver_ftc.loop.plugin_frame import context_of
+from beaver_ftc.loop.plugin_context import context_of
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import load
 from beaver_ftc.scenario.truth import Truth

@@ -4,7 +4,8 @@ from dataclasses import replace
 from typing import Any
 
 from beaver_ftc.loop.outcome import Landing
-from beaver_ftc.scenario.schema import Expect, Scenario
+from beaver_ftc.scenario.expect import Expect
+from beaver_ftc.scenario.schema import Scenario
 
 SURFACES = ("aileron", "elevator", "rudder", "flap")
 LOSS = {"type": "loss_of_effectiveness", "actuator": "elevator", "magnitude": 0.4, "at_s": 12.0}

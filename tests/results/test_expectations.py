@@ -4,7 +4,7 @@ import pytest
 
 from beaver_ftc.results.expectations import evaluate, expectations_in_words
 from beaver_ftc.results.model import Metrics
-from beaver_ftc.scenario.schema import Expect
+from beaver_ftc.scenario.expect import Expect
 
 # Where the metrics have it.
 PATHS = {

@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.results.figures import draw, pictures_of, save
+from beaver_ftc.results.figures import draw
 from beaver_ftc.results.log import StoredLog
+from beaver_ftc.results.pictures import pictures_of, save
 from beaver_ftc.results.series import series_of
 from beaver_ftc.results.style import LOOKS, marks
 from beaver_ftc.results.views import views

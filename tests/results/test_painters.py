@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from beaver_ftc.results import painters as module
-from beaver_ftc.results.figures import pictures_of, save
 from beaver_ftc.results.painters import drawing, painters
+from beaver_ftc.results.pictures import pictures_of, save
 
 pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="processes are forked on Linux")
 

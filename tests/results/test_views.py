@@ -6,17 +6,10 @@ from synthetic import LOSS, landed, scenario
 
 from beaver_ftc.results.figures import draw
 from beaver_ftc.results.metrics import measure
+from beaver_ftc.results.panels import Panel, Trace, View
 from beaver_ftc.results.simulation import Simulation
 from beaver_ftc.results.style import closeup_window, marks
-from beaver_ftc.results.views import (
-    Panel,
-    Trace,
-    View,
-    estimators,
-    power_column,
-    surfaces,
-    views,
-)
+from beaver_ftc.results.views import estimators, power_column, surfaces, views
 
 MORE = (
     "watch_share", *(f"{s}_loss_likelihood_share" for s in ("elevator", "flap")),

@@ -3,7 +3,8 @@
 import pytest
 
 from beaver_ftc.scenario.builtin import builtin_names, builtin_path
-from beaver_ftc.scenario.schema import Expect, load_scenario
+from beaver_ftc.scenario.expect import Expect
+from beaver_ftc.scenario.schema import load_scenario
 
 REQUIRED = {
     "fault-free",

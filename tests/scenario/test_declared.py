@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.scenario.diagnosis import failing, of_several
+from beaver_ftc.scenario.pairs import failing, of_several
 from beaver_ftc.scenario.schema import load
 from flying import declared_in
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from beaver_ftc.scenario.builtin import to_yaml
+from beaver_ftc.scenario.dump import to_yaml
 from beaver_ftc.scenario.schema import Scenario, load, load_scenario, load_text
 
 from .drawn import COUNT, scenarios

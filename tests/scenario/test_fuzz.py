@@ -9,7 +9,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from beaver_ftc.documents.document import Document
-from beaver_ftc.documents.validation import ScenarioError, validate
+from beaver_ftc.documents.report import ScenarioError
+from beaver_ftc.documents.validation import validate
 from beaver_ftc.scenario.builtin import builtin_path
 from beaver_ftc.scenario.schema import Scenario, load_text
 from samples import samples

@@ -8,7 +8,8 @@ import pytest
 import yaml
 
 import beaver_ftc as bf
-from beaver_ftc.scenario.builtin import builtin_names, builtin_path, to_yaml
+from beaver_ftc.scenario.builtin import builtin_names, builtin_path
+from beaver_ftc.scenario.dump import to_yaml
 
 
 class TestLoad:

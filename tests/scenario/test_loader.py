@@ -10,7 +10,7 @@ import pytest
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.documents.files import data_root
-from beaver_ftc.documents.validation import ScenarioError
+from beaver_ftc.documents.report import ScenarioError
 from beaver_ftc.scenario.builtin import resolve
 from beaver_ftc.scenario.schema import load_scenario, load_text
 

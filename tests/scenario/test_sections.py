@@ -2,7 +2,7 @@
 
 import pytest
 
-from beaver_ftc.documents.validation import ScenarioError
+from beaver_ftc.documents.report import ScenarioError
 from beaver_ftc.scenario.schema import load, load_text
 
 FLOAT = "{type: float, actuator: flap, at_s: "

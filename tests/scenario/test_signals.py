@@ -5,7 +5,7 @@ from math import pi, radians
 import numpy as np
 import pytest
 
-from beaver_ftc.documents.validation import ScenarioError
+from beaver_ftc.documents.report import ScenarioError
 from beaver_ftc.scenario.schema import load_text
 from beaver_ftc.scenario.signals import sample
 

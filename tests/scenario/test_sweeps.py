@@ -2,7 +2,7 @@
 
 import pytest
 
-from beaver_ftc.documents.validation import ScenarioError
+from beaver_ftc.documents.report import ScenarioError
 from beaver_ftc.scenario.sweeps import SweepFile, load_sweep_text
 
 HEAD = "base: elevator-partial-loss\nruns: 3\n"

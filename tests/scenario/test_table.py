@@ -6,7 +6,7 @@ import re
 import pytest
 from pydantic_core import PydanticCustomError
 
-from beaver_ftc.documents.validation import ScenarioError
+from beaver_ftc.documents.report import ScenarioError
 from beaver_ftc.scenario.schema import load_scenario
 from beaver_ftc.scenario.signals import check_table
 

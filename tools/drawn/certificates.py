@@ -27,7 +27,7 @@ import numpy as np
 import yaml
 
 import beaver_ftc as bf
-from beaver_ftc.scenario.builtin import to_yaml
+from beaver_ftc.scenario.dump import to_yaml
 from beaver_ftc_assurance.certificates import check_certificate as checker
 from beaver_ftc_assurance.certificates.certificate import MEASURED_MODEL_BOUND
 from beaver_ftc_assurance.certificates.certified import as_text, with_digest

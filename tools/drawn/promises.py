@@ -11,7 +11,7 @@ from typing import Any
 import beaver_ftc as bf
 from beaver_ftc.results.judgement import Truth, is_late
 from beaver_ftc.results.model import DeclaredFault
-from beaver_ftc.scenario.builtin import to_yaml
+from beaver_ftc.scenario.dump import to_yaml
 from beaver_ftc.scenario.faults import UNANTICIPATED
 from beaver_ftc.scenario.schema import load_text
 

@@ -35,7 +35,8 @@ from beaver_ftc.aircraft.schema import (
 from beaver_ftc.documents.document import Problem
 from beaver_ftc.documents.errors import BadInput, suggestion
 from beaver_ftc.documents.files import PACKAGE, data_root, digest_of_files, inside
-from beaver_ftc.documents.validation import ScenarioError, parse_document, text_of, validate
+from beaver_ftc.documents.report import ScenarioError
+from beaver_ftc.documents.validation import parse_document, text_of, validate
 from beaver_ftc.plugins import SERVICES, entries
 
 M_PER_FT = 0.3048

@@ -11,8 +11,9 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.plant.instruments import wrapped
+from beaver_ftc.scenario.autopilot import MEAN_S
 from beaver_ftc.scenario.declared import Declared
-from beaver_ftc.scenario.signals import MEAN_S, TIME_TOLERANCE_S
+from beaver_ftc.scenario.instants import TIME_TOLERANCE_S
 
 ALTITUDE, SPEED, HEADING, BANK = range(4)
 N_CHANNELS = 4

@@ -12,8 +12,10 @@ Numbers are read as YAML 1.2 and everybody's eyes do: 1e-3 is a number, 12:30 an
 """
 
 import re
-from collections.abc import Iterable
+import sys
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from os import PathLike
 from typing import Annotated, Any, NamedTuple, NoReturn
 
 import yaml
@@ -147,6 +149,20 @@ def copied(data: Any) -> Any:
     if isinstance(data, dict):
         return {key: copied(value) for key, value in data.items()}
     return [copied(value) for value in data] if isinstance(data, list) else data
+
+
+def plain(value: Any) -> Any:
+    """Mappings, lists and numbers as a YAML file would give them: no NumPy, no tuples, no models."""
+    if isinstance(value, BaseModel):
+        return value.model_dump(mode="json", by_alias=True, exclude_unset=True)
+    if isinstance(value, Mapping):
+        return {key: plain(entry) for key, entry in value.items()}
+    numpy = sys.modules.get("numpy")  # which nobody has an array of who has not imported it
+    if numpy and isinstance(value, numpy.ndarray | numpy.generic):
+        return plain(value.tolist())
+    if isinstance(value, list | tuple):
+        return [plain(entry) for entry in value]
+    return str(value) if isinstance(value, PathLike) else value
 
 
 @dataclass

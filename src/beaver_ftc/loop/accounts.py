@@ -1,33 +1,23 @@
 """The accounts of a flight, which the metrics are made of. They alone, and the oracle, see the truth.
 
-One of them is the instant from which detection is certain, whatever the uncertainty does: if
-
-    |int e^{-lam (t - tau)} phi_i dtau| > 2 ebar_i
-
-for some axis i, the fault has been detected by t [Zhang2002]: at worst an admissible eta hides ebar_i of the
-fault's effect phi, rad/s2. lam 1/s: pole of a filter, ebar_i rad/s: its threshold. With a bank of filters,
-the first of their instants. phi is the truth's, so this is an analyst's figure: the diagnosis never sees it.
+Two of them have files of their own: the instant from which detection is certain (guarantee.py), and the
+frames in which nothing can be concluded (inconclusive.py).
 """
 
 import numpy as np
 
 from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.control.accommodation import MAX_EVENTS
-from beaver_ftc.design.model import unanticipated_pitch
 from beaver_ftc.diagnosis.detection.filters import filter_share
-from beaver_ftc.diagnosis.error_map import N_MAP_COORDINATES, map_row, outside_span
 from beaver_ftc.diagnosis.monitors import sensor_monitor
 from beaver_ftc.diagnosis.schemes import detection_share
-from beaver_ftc.diagnosis.state import PITCH, PLUGIN_SCHEME
+from beaver_ftc.diagnosis.state import PLUGIN_SCHEME
+from beaver_ftc.loop.guarantee import GUARANTEE
+from beaver_ftc.loop.inconclusive import INCONCLUSIVE, note_inconclusive
 from beaver_ftc.plant import channels as ch
-from beaver_ftc.plant.sensing import effective, position
+from beaver_ftc.plant.sensing import position
 from beaver_ftc.scenario.diagnosis import MAX_POLES
 
-GUARANTEE = record(
-    phi=3, phi_sum=3,  # effect of the faults, rad/s2: now, and over the frame
-    effect=(MAX_POLES, 3),  # filtered as the bank filters the innovation, rad/s
-    certain_after_s=float,
-)  # fmt: skip
 TRACKING = record(
     before=3, frames_before=int,  # squared error before a fault, rad2/s2, and since
     since=3, frames_since=int,
@@ -37,13 +27,6 @@ AUTHORITY = record(demanded=3, lacking=3, beyond_frames=(int, 3))
 CLOSEST = record(filter=MAX_POLES, score=float)
 ENVELOPE = record(
     outside=int, n_exits=int, outside_frames=int, exit_at_s=MAX_EVENTS, return_at_s=MAX_EVENTS,
-)  # fmt: skip
-# Frames in which the diagnosis concludes nothing, of so many watched. undiagnosed: there is none. late: the
-# flight is older than any that was measured. beyond: outside the map of the model's error in this quantity,
-# which was then between least and greatest. between: inside the range of each quantity, but in no box.
-INCONCLUSIVE = record(
-    watched=int, frames=int, from_s=float, undiagnosed=int, late=int, between=int,
-    beyond=(int, N_MAP_COORDINATES), least=N_MAP_COORDINATES, greatest=N_MAP_COORDINATES,
 )  # fmt: skip
 
 
@@ -57,48 +40,6 @@ def accounts_dtype(n: int) -> np.dtype:
         envelope=ENVELOPE, inconclusive=INCONCLUSIVE, beyond_threshold_at_s=float,
         saturated_frames=(int, n), actuator_travel=n, actuator_energy=n, position_then=n,
     )  # fmt: skip
-
-
-@kernel
-def effect_of_faults(guarantee, truth, prediction, y):
-    """Fill guarantee.phi (3,) rad/s2: what the truth's faults do to the angular acceleration, as the design
-    model weighs it."""
-    phi, G, u = guarantee.phi, prediction.G, prediction.u
-    phi[:] = 0.0
-    if truth.faulted:
-        for i in range(3):
-            for s in range(u.size):
-                phi[i] += G[i, s] * (effective(truth, s) - u[s])
-        phi[PITCH] += unanticipated_pitch(prediction.design, y, truth.Cm_alpha3)
-
-
-@kernel
-def add_effect(guarantee):
-    """Add the effect of an instant inside a frame to the sum over the frame."""
-    for i in range(3):
-        guarantee.phi_sum[i] += guarantee.phi[i]
-
-
-@kernel
-def follow_guarantee(guarantee, bank, dt, share, k, t):
-    """Advance the filtered effect by the elapsed frame and note the first instant t (s) of certainty.
-
-    share: one over the instants in a frame. The sum then restarts with this instant. k: number of the
-    diagnosis' frame; with its first one, of 0, its filters are empty, whatever went before.
-    """
-    if k == 0:
-        guarantee.effect[:], guarantee.certain_after_s = 0.0, -1.0
-        guarantee.phi_sum = guarantee.phi
-        return
-    for i in range(3):
-        mean = share * guarantee.phi_sum[i]
-        for m in range(bank.config.n_filters):
-            effect = bank.config.a[m] * guarantee.effect[m, i] + dt * mean
-            guarantee.effect[m, i] = effect
-            certain = abs(effect) > 2.0 * bank.output.threshold[m, i] > 0.0
-            if certain and guarantee.certain_after_s < 0.0:
-                guarantee.certain_after_s = t
-        guarantee.phi_sum[i] = guarantee.phi[i]
 
 
 @kernel
@@ -149,38 +90,6 @@ def note_envelope(envelope, outside, t):
     elif envelope.outside and not outside:
         envelope.return_at_s[last] = t
     envelope.outside = outside
-
-
-@kernel
-def note_inconclusive(inconclusive, fdi, t):
-    """Count this frame, and why nothing can be concluded in it; t s."""
-    enabled, error_map = fdi.config.enabled, fdi.bound.error_map
-    inconclusive.watched += 1
-    if enabled and (error_map.n_boxes == 0 or not error_map.outside):
-        return
-    if inconclusive.frames == 0:
-        inconclusive.from_s = t
-    inconclusive.frames += 1
-    if not enabled:
-        inconclusive.undiagnosed += 1
-    elif map_row(error_map) < 0:
-        inconclusive.late += 1
-    else:
-        note_place(inconclusive, error_map)
-
-
-@kernel
-def note_place(inconclusive, error_map):
-    """Count the quantities in which this place is outside the map."""
-    explained = False
-    for i in range(error_map.coordinates.size):
-        if outside_span(error_map, i):
-            now, first = error_map.coordinates[i], inconclusive.beyond[i] == 0
-            inconclusive.least[i] = now if first else min(now, inconclusive.least[i])
-            inconclusive.greatest[i] = now if first else max(now, inconclusive.greatest[i])
-            inconclusive.beyond[i] += 1
-            explained = True
-    inconclusive.between += not explained
 
 
 @kernel

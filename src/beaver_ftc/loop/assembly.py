@@ -10,7 +10,6 @@ A stage is configured at one of two instants, each of which is one function here
 `assemble` does both. A change in flight assembles the record of its scenario from the same trim.
 """
 
-from math import exp
 from typing import NamedTuple
 
 import numpy as np
@@ -28,93 +27,28 @@ from beaver_ftc.diagnosis.detection.parity_design import required_size
 from beaver_ftc.diagnosis.detection.statistical_design import configure_statistics
 from beaver_ftc.diagnosis.isolation import estimator_names
 from beaver_ftc.diagnosis.monitors.sensor_monitor_design import configure_sensor_monitor
-from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.accounts import accounts_dtype
 from beaver_ftc.loop.frame import true_faults_dtype
+from beaver_ftc.loop.instrument_setup import (
+    are_ever_monitored,
+    configure_instruments,
+    line_for,
+    records_further,
+    seed,
+)
 from beaver_ftc.loop.memory import copied, taken_empty
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.channels import RUNNING
 from beaver_ftc.plant.instruments import (
-    LONGEST_DELAY,
     MEASURED,
-    MOST_LINE,
     N_SAMPLED,
-    SENSORS,
     USUAL_LINE,
     instruments_dtype,
 )
 from beaver_ftc.plant.sensing import truth_dtype
-from beaver_ftc.scenario.builtin import texts_of
 from beaver_ftc.scenario.declared import Declared
-from beaver_ftc.scenario.schema import Scenario, stages
-from beaver_ftc.scenario.sensors import N_IN_EQUATIONS, OF_THE_SLIPSTREAM, ROWS, frames_apart
-
-# What sets the counters of random numbers apart: OF_THE_FIRST, OF_THE_FURTHER, OF_FAULTS, OF_FORCES,
-# OF_THE_SAMPLED.
-COUNTERS = (0, 0xD1B54A32D192ED03, 0x8CB92BA72F3D8DD7, 0xA0761D6478BD642F, 0xE7037ED1A0B428DB)
-
-
-def are_ever_monitored(scenario: Scenario) -> bool:
-    """Whether they are at some time of the flight."""
-    flown = (scenario, *(then for _, then in stages(scenario)))
-    return any(Declared.of(then).monitors_sensors for then in flown)
-
-
-def has_real_engine(scenario: Scenario) -> bool:
-    """Whether dpt is to be worked out from readings that can be wrong from the start."""
-    real = any(not getattr(scenario.sensors, name).is_ideal for name in OF_THE_SLIPSTREAM)
-    return real and scenario.airframe.has_engine_instruments
-
-
-def records_further(scenario: Scenario) -> bool:
-    """Whether accelerometers, the engine's instruments and what the monitor alone compares are recorded. A
-    fault to come has no say in it."""
-    declared = Declared.of(scenario)
-    accelerometers = declared.uses_accelerometers or declared.follows_gusts_by_accelerometers
-    sampled = any(not getattr(scenario.sensors, row.name).is_ideal for row in ROWS[N_IN_EQUATIONS:])
-    return declared.monitors_sensors or accelerometers or has_real_engine(scenario) or sampled
-
-
-def configure(instruments: np.void, scenario: Scenario, dt: float) -> None:
-    """Fill the instruments' record; dt: seconds between samples, which is a JSBSim frame."""
-    instruments["real"] = not scenario.sensors.is_ideal
-    instruments["engine"] = has_real_engine(scenario)
-    for i, name in enumerate(SENSORS):
-        sensor = getattr(scenario.sensors, name)
-        instruments["noise"][i], instruments["bias"][i], instruments["quantum"][i] = sensor.noise_bias_quantum
-        instruments["gain"][i], instruments["dropout"][i] = 1.0 + sensor.scale_error, sensor.dropout_share
-        instruments["drift"][i] = getattr(sensor, "drift_rad_s", 0.0) * dt
-        instruments["keep"][i] = exp(-sensor.bandwidth_rad_s * dt) if sensor.bandwidth_rad_s else 0.0
-        instruments["delay"][i] = sensor.delay_s / dt
-        instruments["length"][i] = _samples(sensor.delay_s / dt)
-        instruments["every"][i] = frames_apart(i, dt)
-        if sensor.delay_s / dt > LONGEST_DELAY:
-            raise BadInput(
-                f"{scenario.name}: sensors.{name}.delay_s is {sensor.delay_s:g} s, "
-                f"allowed: {LONGEST_DELAY} JSBSim frames, {LONGEST_DELAY * dt:g} s here"
-            )
-
-    instruments["first"] = np.cumsum(instruments["length"]) - instruments["length"]
-
-
-def line_for(scenario: Scenario) -> int:
-    """How many samples the delay lines of a flight keep: as many as most flights', or as any's."""
-    instant_s, flown = 1.0 / scenario.rate_hz / scenario.substeps, [scenario]
-    flown += [then for _, then in stages(scenario)]
-    delays = [[getattr(then.sensors, name).delay_s / instant_s for name in SENSORS] for then in flown]
-    needed = [sum(_samples(delay) for delay in of_it) for of_it in delays]
-    return USUAL_LINE if max(needed) <= USUAL_LINE else MOST_LINE
-
-
-def _samples(delay: float) -> int:
-    """What a line of this delay, in JSBSim frames, keeps."""
-    return int(delay) + 2 if delay else 0
-
-
-def seed(instruments: np.void, number: int) -> None:
-    """Let the random numbers of all instruments, further ones and faults, begin with a seed."""
-    instruments["random"] = np.uint64(number) ^ np.array(COUNTERS, np.uint64)
-
+from beaver_ftc.scenario.kept import texts_of
+from beaver_ftc.scenario.schema import Scenario
 
 # How many columns the log has for estimators, the sensor monitor, sensors with rates of their own, the
 # engine, statistical tests.
@@ -209,7 +143,7 @@ def _assemble_design(scenario: Scenario, travel: np.ndarray, line: int) -> np.nd
     truth, channels = frame["truth"], ch.truth_channels(aircraft)
     truth["n"], truth["declared"] = len(channels), len(aircraft.signals)
     truth["factor"][: len(channels)] = [factor for _, _, factor in channels]
-    configure(frame["instruments"], scenario, instant_s)
+    configure_instruments(frame["instruments"], scenario, instant_s)
     declared = Declared.of(scenario)
     model_prediction.configure_prediction(frame["prediction"], declared, travel)
     schemes.configure_diagnosis(frame["fdi"], frame["prediction"], declared, travel)

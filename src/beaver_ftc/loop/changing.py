@@ -15,11 +15,12 @@ from beaver_ftc.control.state import loses_truth, take_over
 from beaver_ftc.diagnosis.schemes import prepare_takeover
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.assembly import assemble
-from beaver_ftc.loop.plugin_frame import PluginFrame, named_detector, named_law, plugged
+from beaver_ftc.loop.plugin_frame import PluginFrame
+from beaver_ftc.loop.plugin_setup import named_detector, named_law, plugged
 from beaver_ftc.plant.faults import NEVER
 from beaver_ftc.plant.instruments import take_configuration
+from beaver_ftc.scenario.instants import frame_of
 from beaver_ftc.scenario.schema import Change, Scenario, stages
-from beaver_ftc.scenario.signals import frame_of
 
 
 class Stage(NamedTuple):

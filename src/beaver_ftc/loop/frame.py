@@ -33,7 +33,8 @@ from beaver_ftc.diagnosis.monitors import engine_monitor, sensor_monitor
 from beaver_ftc.diagnosis.schemes.isolated_surfaces import record_isolated_surfaces
 from beaver_ftc.diagnosis.state import PITCH
 from beaver_ftc.diagnosis.types import modes
-from beaver_ftc.loop.accounts import account, add_effect, effect_of_faults, follow_guarantee
+from beaver_ftc.loop.accounts import account
+from beaver_ftc.loop.guarantee import add_effect, effect_of_faults, follow_guarantee
 from beaver_ftc.loop.log_row import record_row
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.sensing import (

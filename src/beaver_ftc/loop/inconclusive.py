@@ -1,4 +1,5 @@
-"""In what share of a flight's frames the built-in diagnosis could conclude nothing, and why."""
+"""In what share of a flight's frames the built-in diagnosis could conclude nothing, and why: counted frame by
+frame (`note_inconclusive`), and in words (`inconclusive_of`)."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -6,7 +7,9 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
+from beaver_ftc.compiled import kernel, record
 from beaver_ftc.design.atmosphere import altitude_of
+from beaver_ftc.diagnosis.error_map import N_MAP_COORDINATES, map_row, outside_span
 from beaver_ftc.scenario.measured_range import (
     ALTITUDE,
     BETWEEN,
@@ -19,8 +22,49 @@ from beaver_ftc.scenario.measured_range import (
     quantities,
 )
 
+# Frames in which the diagnosis concludes nothing, of so many watched. undiagnosed: there is none. late: the
+# flight is older than any that was measured. beyond: outside the map of the model's error in this quantity,
+# which was then between least and greatest. between: inside the range of each quantity, but in no box.
+INCONCLUSIVE = record(
+    watched=int, frames=int, from_s=float, undiagnosed=int, late=int, between=int,
+    beyond=(int, N_MAP_COORDINATES), least=N_MAP_COORDINATES, greatest=N_MAP_COORDINATES,
+)  # fmt: skip
+
+
 SCHEME, NO_DIAGNOSIS = "scheme", "no diagnosis ran: fdi.scheme is none"
 Reason = dict[str, Any]
+
+
+@kernel
+def note_inconclusive(inconclusive, fdi, t):
+    """Count this frame, and why nothing can be concluded in it; t s."""
+    enabled, error_map = fdi.config.enabled, fdi.bound.error_map
+    inconclusive.watched += 1
+    if enabled and (error_map.n_boxes == 0 or not error_map.outside):
+        return
+    if inconclusive.frames == 0:
+        inconclusive.from_s = t
+    inconclusive.frames += 1
+    if not enabled:
+        inconclusive.undiagnosed += 1
+    elif map_row(error_map) < 0:
+        inconclusive.late += 1
+    else:
+        note_place(inconclusive, error_map)
+
+
+@kernel
+def note_place(inconclusive, error_map):
+    """Count the quantities in which this place is outside the map."""
+    explained = False
+    for i in range(error_map.coordinates.size):
+        if outside_span(error_map, i):
+            now, first = error_map.coordinates[i], inconclusive.beyond[i] == 0
+            inconclusive.least[i] = now if first else min(now, inconclusive.least[i])
+            inconclusive.greatest[i] = now if first else max(now, inconclusive.greatest[i])
+            inconclusive.beyond[i] += 1
+            explained = True
+    inconclusive.between += not explained
 
 
 def inconclusive_of(frame: np.void, aircraft: Aircraft) -> dict[str, Any] | None:

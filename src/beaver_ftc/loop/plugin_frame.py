@@ -6,7 +6,7 @@ are the stages of frame.py; left of the bar: built in, right of it: a plug-in's 
 taken by `diagnose` (adaptive_estimators.plugin_update).
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from copy import deepcopy
 from math import isfinite
 from typing import Any
@@ -14,24 +14,19 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.compiled import direct
-from beaver_ftc.control import Law, Reference, has_kernels, row_of
-from beaver_ftc.design.context import Context
-from beaver_ftc.design.model import DesignFunctions
+from beaver_ftc.control import Law, Reference
 from beaver_ftc.diagnosis import Detector, Measured, Verdict
-from beaver_ftc.diagnosis.deviations import plugin_errors
 from beaver_ftc.diagnosis.state import (
     NOT_ISOLATED,
-    PLUGIN_SCHEME,
     UNANTICIPATED,
-    WORST_CASE_DETECTOR,
 )
 from beaver_ftc.documents.errors import NO_FAILURE, SimulationFailed
 from beaver_ftc.loop import stepping as stages
 from beaver_ftc.loop.assembly import Trim
 from beaver_ftc.loop.findings import verdict_of
+from beaver_ftc.loop.plugin_context import context_of, measured_of
 from beaver_ftc.plant.sensing import NOT_FINITE
-from beaver_ftc.plugins import DETECTORS, LAWS, is_compiled, made
-from beaver_ftc.scenario.declared import Declared
+from beaver_ftc.plugins import DETECTORS, LAWS, is_compiled
 from beaver_ftc.scenario.schema import Scenario
 
 _AXES = {"p": 0, "q": 1, "r": 2, None: 0}
@@ -193,99 +188,3 @@ class PluginFrame:
         if not np.isfinite(array).all():
             self._blame(name, f"{what} is not finite: {array.tolist()}")
         return array
-
-
-def measured_of(frame: np.void) -> Measured:
-    """What is known at the frame just flown."""
-    return Measured(
-        float(frame["t"]),
-        frame["measured"]["x"].copy(),
-        frame["measured"]["y"][: 4 + int(frame["truth"]["declared"])].copy(),
-        frame["prediction"]["means"]["F"].copy(),
-        frame["prediction"]["means"]["Gu"].copy(),
-        frame["fdi"]["bound"]["eta_bar"].copy(),
-        frame["measured"]["attitude"].copy(),
-        frame["measured"]["force"].copy(),
-        float(frame["measured"]["altitude"]),
-    )
-
-
-def context_of(frames: np.ndarray, scenario: Scenario, trim: Trim, options: Mapping[str, float]) -> Context:
-    """What a plug-in is given before the flight; trim: what is known of it."""
-    frame, aircraft = frames[0], scenario.airframe
-    layout, bound, design = frame["control"]["layout"], frame["fdi"]["bound"], frames["prediction"]["design"]
-    constant = bound["const"].copy()
-    if bound["error_map"]["n_boxes"]:
-        constant += aircraft.model_error_rad_s2  # the most that the aircraft's terms leave in it
-    return Context(
-        dt_s=float(frame["dt"]),
-        substeps=scenario.substeps,
-        model=DesignFunctions(design.copy()),
-        trim_x=trim.x.copy(),
-        trim_y=trim.y.copy(),
-        trim_rad=trim.command.copy(),
-        travel_rad=np.array([layout["low"], layout["high"]]),
-        constant_rad_s2=constant,
-        inertia_coupling=bound["inertia_coupling_error_share"].copy(),
-        surfaces=aircraft.surfaces,
-        leading=(int(layout["main"][0]), int(layout["main"][1]), int(layout["main"][2])),
-        options=dict(options),
-        declared=plugin_errors(Declared.of(scenario), design, trim.y, trim.u),
-    )
-
-
-def named_detector(scenario: Scenario) -> Detector | None:
-    """The plug-in a scenario names for its diagnosis; None if it is compiled in.
-
-    Raises BadInput for a name that cannot be loaded.
-    """
-    scheme = scenario.fdi.scheme
-    return None if is_compiled(DETECTORS, scheme) else made(DETECTORS, scheme)
-
-
-def named_law(frames: np.ndarray, scenario: Scenario, trim: Trim) -> Law | None:
-    """The plug-in a scenario names for its law; None if it is compiled in, or has a compiled form, which is
-    put into the record then. trim: as in `context_of`. Raises as `named_detector` does."""
-    if is_compiled(LAWS, scenario.control.law):
-        return None
-    law = made(LAWS, scenario.control.law)
-    compile_into = getattr(law, "compile_into", None)
-    if compile_into is None or not has_kernels(scenario.control.law):
-        return law
-    law.reset(context_of(frames, scenario, trim, scenario.control.options))
-    control = frames["control"][0]
-    control["power"]["config"]["enabled"] = 0
-    compile_into(control[row_of(scenario.control.law).file])
-    return None
-
-
-def plugged(
-    frames: np.ndarray,
-    scenario: Scenario,
-    trim: Trim,
-    detector: Detector | None,
-    law: Law | None,
-    begun: PluginFrame | None = None,
-) -> PluginFrame | None:
-    """The frame with these plug-ins, the record made ready for them; None with none. begun: as in
-    `PluginFrame`. Raises SimulationFailed for a plug-in that fails at reset."""
-    if detector is None and law is None:
-        return None
-    if detector is not None:  # no built-in isolation; instead, one estimator a surface for its verdict
-        fdi = frames["fdi"][0]
-        fdi["config"]["enabled"] = fdi["config"]["diagnoses_all_types"] = fdi["isolation"]["config"][
-            "n_estimators"
-        ] = 0
-        fdi["statistical"]["test"]["enabled"] = fdi["sensor_monitor"]["config"]["enabled"] = 0
-        fdi["config"]["scheme_number"] = PLUGIN_SCHEME
-        fdi["config"]["exclusion_authority"] = WORST_CASE_DETECTOR
-        fdi["types"]["pair"]["enabled"] = 0
-        n = fdi["types"]["surface"].size
-        fdi["isolation"]["estimator"]["surface"][:n] = range(n)
-    if law is not None:
-        control = frames["control"][0]
-        control["power"]["config"]["enabled"] = 0
-        config = control["config"]
-        config["uses_verdict"], config["reallocates"] = getattr(law, "fault_tolerant", False), 0
-        config["informed"] = 0
-    return PluginFrame(frames, scenario, trim, detector, law, begun)

@@ -17,7 +17,7 @@ from beaver_ftc.loop.findings import verdict_of
 from beaver_ftc.loop.inconclusive import inconclusive_now
 from beaver_ftc.loop.loop import CHUNK_ROWS, FLYING, ONE_FLIES, LogSink, Loop
 from beaver_ftc.loop.outcome import Landing
-from beaver_ftc.loop.plugin_frame import measured_of
+from beaver_ftc.loop.plugin_context import measured_of
 from beaver_ftc.loop.readout import FrameReadout
 from beaver_ftc.plant.adapter import Plant, UnknownProperty
 from beaver_ftc.plant.faults import is_there

@@ -1,7 +1,7 @@
 """Where JSBSim keeps what compiled code reads, writes and runs: addresses in this build of its binding.
 
 A wrong guess of a build's layout would end the process. So the layout is proved once a build, in a child that
-may crash (documents/files.py); where it is another, properties are read and written through the binding.
+may crash (documents/trials.py); where it is another, properties are read and written through the binding.
 
 Nothing here is compiled: what only trims an aircraft has no need of a compiler. See channels.py.
 """
@@ -15,7 +15,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from beaver_ftc.documents.errors import say_once
-from beaver_ftc.documents.files import digest_of_files, passes
+from beaver_ftc.documents.files import digest_of_files
+from beaver_ftc.documents.trials import passes
 
 if TYPE_CHECKING:
     import jsbsim

@@ -17,7 +17,8 @@ from beaver_ftc.aircraft.schema import AircraftFile
 from beaver_ftc.documents.document import Location, Problem
 from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.documents.files import cache_base, digest_of_aircraft, digest_of_files
-from beaver_ftc.documents.validation import ScenarioError, parse_document
+from beaver_ftc.documents.report import ScenarioError
+from beaver_ftc.documents.validation import parse_document
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.model_file import check_model_has_no_side_effects
 from beaver_ftc.plant.trial import failure

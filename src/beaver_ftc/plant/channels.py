@@ -227,7 +227,7 @@ def _call_run(typingctx, function, executive):
 @kernel
 def advance(simulator):
     """One JSBSim frame; simulator: of dtype RUNNING. Turbulence is first turned along the heading, see
-    `loop.loop.Cockpit.turn_air`."""
+    `loop.cockpit.Cockpit.turn_air`."""
     if simulator.turbulent:
         heading: float = _call_getter(simulator.getter, simulator.heading_pointer)  # type: ignore
         _call_setter(simulator.setter, simulator.axes_pointer, -heading)

@@ -28,8 +28,8 @@ from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.addresses import executive_address
 from beaver_ftc.plant.trim import TrimPoint
 from beaver_ftc.plant.true_aircraft import configure, take_off, trim_of
-from beaver_ftc.scenario.builtin import texts_of
 from beaver_ftc.scenario.declared import Declared
+from beaver_ftc.scenario.kept import texts_of
 from beaver_ftc.scenario.schema import Scenario, ScenarioLike, load
 from beaver_ftc.scenario.truth import Truth
 

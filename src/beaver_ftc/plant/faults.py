@@ -21,8 +21,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from beaver_ftc.scenario.faults import DAMAGE, HEALTHY, Past, SensorFault, SurfaceFault, place_of
+from beaver_ftc.scenario.instants import frame_of, grown_share
 from beaver_ftc.scenario.sensors import QUANTITIES, Sensors
-from beaver_ftc.scenario.signals import frame_of, grown_share
 
 if TYPE_CHECKING:
     from beaver_ftc.plant.adapter import Plant

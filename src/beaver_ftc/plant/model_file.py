@@ -21,7 +21,7 @@ from beaver_ftc.aircraft.schema import writing_property
 from beaver_ftc.documents.document import MAX_PROBLEMS
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.documents.files import UnreadableError, read_bytes
-from beaver_ftc.documents.validation import one_line
+from beaver_ftc.documents.report import one_line
 
 SCRIPT = "runscript"
 ENGINES, SYSTEMS = "Engines", "Systems"

@@ -14,9 +14,9 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.plant.adapter import FT_PER_M, Plant
 from beaver_ftc.plant.faults import NEVER
 from beaver_ftc.plant.trim import TrimPoint, trim
-from beaver_ftc.scenario.airframe import Gust
-from beaver_ftc.scenario.schema import Uncertainty
-from beaver_ftc.scenario.signals import frame_of
+from beaver_ftc.scenario.air import Gust
+from beaver_ftc.scenario.instants import frame_of
+from beaver_ftc.scenario.model_errors import Uncertainty
 from beaver_ftc.scenario.truth import Truth
 
 DELAY = "actuators/delay-s"

@@ -4,8 +4,6 @@ An expectation fails if its quantity does not exist, for example if there was no
 absence. A name that was given before its fault began meets no expectation. A failed expectation of the
 diagnosis has a reason if the name was premature or withdrawn, or if there were frames in which the diagnosis
 could conclude nothing.
-
-The functions at the end write values and times for all words of a flight.
 """
 
 from collections.abc import Iterator
@@ -13,11 +11,9 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from beaver_ftc.results.model import Expectation, Metrics
+from beaver_ftc.results.words import MOTION_OF_AXIS, three_digits, value_text, without_underscores
 from beaver_ftc.scenario import measured_range
-from beaver_ftc.scenario.warnings import OF_DIAGNOSIS
-
-MOTION_OF_AXIS = {"p": "roll", "q": "pitch", "r": "yaw"}
-
+from beaver_ftc.scenario.expect import OF_DIAGNOSIS
 
 Texts = tuple[str, str]
 """Two texts: the expected value, and the actual value; the second is empty if it adds nothing."""
@@ -237,38 +233,3 @@ def _in_words(result: Expectation) -> ExpectationInWords:
     expected, actual = rule.texts(result)
     actual = "; ".join(filter(None, (actual, result.reason)))
     return ExpectationInWords(result.name, expected, actual, result.passed, rule.share(result))
-
-
-def value_text(value: Any) -> str:
-    """An expected or actual value of any key of `expect:` as text."""
-    if value in (None, (), []):
-        return "none"
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if isinstance(value, tuple | list):
-        return ", ".join(value_text(entry) for entry in value)
-    return value if isinstance(value, str) else three_digits(value)
-
-
-def without_underscores(name: str) -> str:
-    """A name of the code in words."""
-    return name.replace("_", " ")
-
-
-def three_digits(value: float) -> str:
-    """A number of three significant digits, without an exponent from 0.0001 to a million: 1230, not
-    1.23e+03."""
-    return f"{float(f'{value:.3g}'):g}"
-
-
-def span_text(begin_s: float, end_s: float | None) -> str:
-    """A span of time, s; only the begin if it has no end."""
-    begin = seconds_text(begin_s)
-    return begin if end_s is None else f"{begin} to {seconds_text(end_s)}"
-
-
-def seconds_text(seconds: float | None) -> str:
-    """A time as text, with one digit less from 1000 s on."""
-    if seconds is None:
-        return "none"
-    return f"{seconds:.2f} s" if seconds < 1000 else f"{seconds:.1f} s"

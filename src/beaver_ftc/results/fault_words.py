@@ -4,8 +4,8 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 
-from beaver_ftc.results.expectations import seconds_text, span_text, value_text, without_underscores
 from beaver_ftc.results.model import DeclaredFault, Fault, Metrics, Named, Window, Withdrawn
+from beaver_ftc.results.words import seconds_text, span_text, value_text, without_underscores
 from beaver_ftc.scenario.faults import TYPES, acting_at, masking, size_at
 from beaver_ftc.scenario.sensors import QUANTITIES
 

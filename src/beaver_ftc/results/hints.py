@@ -4,8 +4,8 @@ import math
 from typing import TYPE_CHECKING
 
 from beaver_ftc.results.model import Metrics
-from beaver_ftc.scenario.diagnosis import of_several
-from beaver_ftc.scenario.signals import TIME_TOLERANCE_S
+from beaver_ftc.scenario.instants import TIME_TOLERANCE_S
+from beaver_ftc.scenario.pairs import of_several
 from beaver_ftc.scenario.undeclared import declares_all
 
 if TYPE_CHECKING:

@@ -16,9 +16,9 @@ from math import inf
 from typing import Any, Self
 
 from beaver_ftc.results.model import DeclaredFault, Quantity
-from beaver_ftc.scenario.diagnosis import failing
 from beaver_ftc.scenario.faults import UNANTICIPATED, Damage, acting_at
-from beaver_ftc.scenario.signals import TIME_TOLERANCE_S, first_frame_s, is_before, is_in_force
+from beaver_ftc.scenario.instants import TIME_TOLERANCE_S, first_frame_s, is_before, is_in_force
+from beaver_ftc.scenario.pairs import failing
 
 TIME_DECIMALS = 9  # decimals of a second: removes the rounding of frame times
 

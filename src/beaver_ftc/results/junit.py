@@ -11,7 +11,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from beaver_ftc.documents.errors import SimulationFailed
-from beaver_ftc.documents.validation import one_line
+from beaver_ftc.documents.report import one_line
 from beaver_ftc.results.model import Judged
 
 _MAX_LINE_CHARACTERS = 10_000  # of a line of a text

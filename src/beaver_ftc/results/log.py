@@ -11,7 +11,7 @@ import contextlib
 import math
 import shutil
 import tempfile
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -29,11 +29,6 @@ Values = dict[str, np.ndarray]
 ROWS_PER_GROUP = 16384  # 12 MB of 90 columns: large enough to compress well, small enough to hold
 _ROWS_PER_BLOCK = 256  # rows transposed at a time: a block fits the cache of the processor, four times faster
 _MAX_ROWS_PER_GROUP = 1_000_000  # a file with more is refused: a run writes ROWS_PER_GROUP
-_UNIT_OF_NAME_ENDING = (  # ending of a column's name, unit; `_rad_s` before `_s`, which it ends with
-    ("_rad_s2", "rad/s2"), ("_deg2_s", "deg2/s"), ("_deg_s", "deg/s"), ("_rad_s", "rad/s"),
-    ("_per_s", "1/s"), ("_rad", "rad"), ("_deg", "deg"), ("_mps", "m/s"), ("_inhg", "inHg"), ("_pa", "Pa"),
-    ("_hz", "Hz"), ("_m", "m"), ("_s", "s"),
-)  # fmt: skip
 
 
 class ParquetLog:
@@ -320,24 +315,11 @@ def _column_values(column: Any) -> np.ndarray:
     return np.concatenate(parts or [np.empty(0)])
 
 
-def units(columns: Iterable[str]) -> dict[str, str]:
-    """The unit of each column."""
-    return {column: unit_of(column) for column in columns}
-
-
-def unit_of(column: str) -> str:
-    """The unit of a column, from the ending of its name, or else of the section in front of it; "1" for a
-    pure number. `tracking.surface_travel_deg.aileron` has the unit deg.
-    """
-    parts = reversed(column.split("."))
-    return next(
-        (unit for part in parts for ending, unit in _UNIT_OF_NAME_ENDING if part.endswith(ending)), "1"
-    )
-
-
 def log_dataframe(log: "Log", metrics: Metrics) -> "DataFrame":
     """The log as a DataFrame, float64, with scenario, seed, verdict and units in `attrs`."""
     from pandas import DataFrame
+
+    from beaver_ftc.results.units import units
 
     if isinstance(log, MemoryLog):
         table = DataFrame(np.asfortranarray(log.rows), columns=list(log.columns), copy=False)

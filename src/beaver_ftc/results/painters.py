@@ -20,7 +20,7 @@ from multiprocessing.connection import Connection
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from beaver_ftc.results.figures import Picture
+    from beaver_ftc.results.pictures import Picture
 
 N_PAINTERS = 2  # one for each of two cores: the process that flies waits while they draw
 Painters = Sequence[Connection]
@@ -88,7 +88,7 @@ def drawing(pictures: "Sequence[Picture]", connections: Painters) -> Iterator[No
 def save_all(pictures: "Sequence[Picture]") -> None:
     """Draw pictures in this process."""
     if pictures:
-        from beaver_ftc.results.figures import save
+        from beaver_ftc.results.pictures import save
 
         for picture in pictures:
             save(picture)

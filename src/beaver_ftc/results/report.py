@@ -19,16 +19,10 @@ import numpy as np
 from beaver_ftc.results import log, verdict
 from beaver_ftc.results.expectations import expectations_in_words
 from beaver_ftc.results.model import Document, Metrics
+from beaver_ftc.results.panels import Panel, View
 from beaver_ftc.results.series import MAX_CURVE_POINTS, series_of
 from beaver_ftc.results.style import LOOKS, MODE_COLOURS, SHADES, closeup_window, marks
-from beaver_ftc.results.views import (
-    Panel,
-    View,
-    expected_airspeed_mps,
-    surfaces,
-    surfaces_by_kind,
-    views,
-)
+from beaver_ftc.results.views import expected_airspeed_mps, surfaces, surfaces_by_kind, views
 
 if TYPE_CHECKING:
     from jinja2 import Template

@@ -45,7 +45,7 @@ def write_documents(folder: Path, scenario: "Scenario", document: Document) -> N
 
 def write_scenario(folder: Path, scenario: "Scenario") -> None:
     """Write scenario.yaml, and a copy of an own aircraft, into a result folder."""
-    from beaver_ftc.scenario.builtin import to_yaml
+    from beaver_ftc.scenario.dump import to_yaml
 
     # an own aircraft is copied, so that the folder alone can be flown again
     if str(scenario.aircraft).startswith("./"):
@@ -74,8 +74,8 @@ def write_report_files(
     to: another folder to write into. painters: the processes that draw the figures; without them this process
     draws. formats: endings of the figures, none for no figures. sections: of studies, for the report.
     """
-    from beaver_ftc.results.figures import pictures_of
     from beaver_ftc.results.painters import drawing
+    from beaver_ftc.results.pictures import pictures_of
     from beaver_ftc.results.report import write_report
 
     to = to or folder

@@ -16,7 +16,7 @@ from itertools import accumulate
 import numpy as np
 
 from beaver_ftc.results import log
-from beaver_ftc.scenario.signals import MEAN_S
+from beaver_ftc.scenario.autopilot import MEAN_S
 
 MAX_CURVE_POINTS = 4000
 WHOLE_FLIGHT_S = (-math.inf, math.inf)

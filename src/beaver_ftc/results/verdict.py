@@ -8,13 +8,7 @@ import re
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from beaver_ftc.results.expectations import (
-    MOTION_OF_AXIS,
-    expectations_in_words,
-    seconds_text,
-    span_text,
-    value_text,
-)
+from beaver_ftc.results.expectations import expectations_in_words
 from beaver_ftc.results.fault_words import fault_text, isolation_texts, window_text
 from beaver_ftc.results.model import (
     Authority,
@@ -29,6 +23,7 @@ from beaver_ftc.results.model import (
     Statistical,
 )
 from beaver_ftc.results.terminal import printed, verdict_table
+from beaver_ftc.results.words import MOTION_OF_AXIS, seconds_text, span_text, value_text
 from beaver_ftc.scenario.measured_range import in_words
 from beaver_ftc.scenario.warnings import wider
 

@@ -1,19 +1,12 @@
-"""The views of a flight: a view is a list of panels, a panel a list of traces, a trace a column of the log.
+"""The views of a flight, for the figures and the report alike: those that the columns of its log allow."""
 
-The figures and the report draw the same views. The unit of a column follows from its name; radians are shown
-as degrees.
-"""
-
-import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from beaver_ftc.aircraft import AXES
-from beaver_ftc.results import log
-from beaver_ftc.results.expectations import MOTION_OF_AXIS, without_underscores
 from beaver_ftc.results.model import Metrics
+from beaver_ftc.results.panels import Panel, View, panel_of, ratio_panel
 from beaver_ftc.results.series import (
     COMMANDED_AIRSPEED_COLUMN,
     MEAN_AIRSPEED_COLUMN,
@@ -21,6 +14,7 @@ from beaver_ftc.results.series import (
     UNLIKE_ENDING,
     source_columns,
 )
+from beaver_ftc.results.words import MOTION_OF_AXIS, without_underscores
 from beaver_ftc.scenario.diagnosis import MODES
 from beaver_ftc.scenario.sensors import N_IN_EQUATIONS, ROWS
 
@@ -32,89 +26,10 @@ ATTAINABLE_AIRSPEED_COLUMN = "airspeed_limited_mps"  # the commanded airspeed, a
 BEAVER_POWER_COLUMN = "manifold_pressure_inhg"
 # Columns that may stand before that of the engine power: alarm, sensor monitor, sensors of the monitor alone.
 _BEFORE_POWER = {"detected", "watch_test", "watch_missing", *(row.column for row in ROWS[N_IN_EQUATIONS:])}
-AXIS_QUANTILES = 0.005, 0.995  # these quantiles set an axis that clips spikes
 MEAN_AIRSPEED_EXPECTATION = "airspeed_within_mps"  # the expectation about the mean airspeed
 
 Names = Sequence[str]
 """Names of columns, surfaces or estimators, in the order of the log or of the aircraft."""
-
-_SHOWN_UNIT = {"rad/s2": "deg/s²", "rad/s": "deg/s", "rad": "deg", "1": ""}  # other units are shown unchanged
-
-
-@dataclass(frozen=True)
-class Trace:
-    """One curve: a column of the log or derived from it, its label, and its role, which determines its look
-    (style.py).
-
-    The shown value is factor * column + offset; offset has the shown unit.
-    """
-
-    column: str
-    label: str
-    role: str
-    sign: float = 1.0
-    offset: float = 0.0
-
-    @property
-    def factor(self) -> float:
-        """Factor from the unit of the column to the shown one, with the sign."""
-        return self.sign * unit_of(self.column)[1]
-
-
-@dataclass(frozen=True)
-class Panel:
-    """One pair of axes, over the time in seconds."""
-
-    label: str
-    traces: tuple[Trace, ...]
-    log_scale: bool = False
-    limits: tuple[float, float] | None = None
-    value_names: tuple[str, ...] = ()  # names of the values 0, 1, 2, ... of a discrete quantity
-    shade_column: str = ""  # a 0/1 column: the panel is shaded while it is 1
-    shade_label: str = ""
-    line_at: float | None = None  # a horizontal line is drawn at this value
-    clips_spikes: bool = False  # AXIS_QUANTILES set the axis; an arrow marks spikes beyond them
-    bars: bool = False  # a row for each label, with a bar while one of its traces is 0
-    bars_during_column: str = ""  # a 0/1 column: bars are drawn only while it is 1
-
-    @property
-    def steps(self) -> tuple[str, ...]:
-        """The names along the axis: of the values of a discrete quantity, or of the rows of a panel of
-        bars."""
-        return tuple(dict.fromkeys(trace.label for trace in self.traces)) if self.bars else self.value_names
-
-    @property
-    def unit(self) -> str:
-        """The unit of the first trace, which all traces share; empty for a dimensionless quantity."""
-        return unit_of(self.traces[0].column)[0]
-
-
-@dataclass(frozen=True)
-class View:
-    """A figure: panels, filled row by row into `n_panel_columns` columns of panels."""
-
-    name: str
-    title: str
-    panels: tuple[Panel, ...]
-    n_panel_columns: int = 1
-    text_without_data: str = ""  # written into the panels if the columns have no data
-    closeup: bool = False  # also drawn around the events
-    folded: bool = False  # details: the report shows them after a click
-
-    @property
-    def columns(self) -> tuple[str, ...]:
-        """The columns that it shows: of the log, or derived from it (series.py)."""
-        traced = [trace.column for panel in self.panels for trace in panel.traces]
-        flags = [
-            flag for panel in self.panels for flag in (panel.shade_column, panel.bars_during_column) if flag
-        ]
-        return tuple(dict.fromkeys(traced + flags))
-
-
-def unit_of(column: str) -> tuple[str, float]:
-    """The shown unit of a log column, and the factor from the unit of the column to it."""
-    unit = log.unit_of(column)
-    return _SHOWN_UNIT.get(unit, unit), math.degrees(1.0) if unit.startswith("rad") else 1.0
 
 
 def estimators(columns: Names) -> tuple[str, ...]:
@@ -181,23 +96,11 @@ def power_column(columns: Names) -> str:
     return "" if neighbour in _BEFORE_POWER else neighbour
 
 
-def _panel(label: str, *traces: tuple[Any, ...], **fields: Any) -> Panel:
-    """A panel of traces. traces: fields of each `Trace`, (column, label, role) and optionally more. fields:
-    further fields of the panel."""
-    return Panel(label, tuple(Trace(*trace) for trace in traces), **fields)
-
-
-def _ratio_panel(label: str, *traces: tuple[str, str, str]) -> Panel:
-    """A panel of ratios, on a logarithmic scale with a line at 1, which a healthy aircraft does not
-    exceed."""
-    return _panel(label, *traces, log_scale=True, line_at=1.0)
-
-
 _TRACKING = View(
     "tracking",
     "Tracking: body rates against their reference",
     tuple(
-        _panel(
+        panel_of(
             AXIS_NAMES[axis],
             (f"{axis}_reference_rad_s", "reference", "command"),
             (f"{axis}_model_rad_s", "reference model", "target"),
@@ -220,14 +123,14 @@ def _profile_view(limited: bool, power: str, within_mps: float | None) -> View:
     mean = _mean_airspeed_traces(within_mps)
     further = {"airspeed": [(ATTAINABLE_AIRSPEED_COLUMN, "attainable", "command")] if limited else []}
     panels = [
-        _panel(
+        panel_of(
             label, (command, "commanded", "target"), *further.get(label, ()), (actual, "flown", "actual"),
             *(mean if label == "airspeed" else ()),
         )
         for label, command, actual in flown
     ]  # fmt: skip
     words = power.removesuffix("_inhg").replace("_", " ")
-    engine = [_panel(f"engine: {words}", (power, "flown", "actual"))] if power else []
+    engine = [panel_of(f"engine: {words}", (power, "flown", "actual"))] if power else []
     return View("profile", "Profile: commanded and flown", (*panels, *engine))
 
 
@@ -272,7 +175,7 @@ def _surfaces_view(names: Names) -> View:
     """A panel for each surface; of many surfaces, two panels for each kind."""
     if len(names) > len(SURFACE_ROLES):
         panels = tuple(
-            _panel(
+            panel_of(
                 f"{kind}: {label}", *((f"{name}_{ending}_rad", called, role) for name, called, role in group)
             )
             for kind, group in _labels_and_roles_by_kind(names).items()
@@ -280,7 +183,7 @@ def _surfaces_view(names: Names) -> View:
         )
         return View("surfaces", "Control surfaces by kind", panels, n_panel_columns=2)
     panels = tuple(
-        _panel(
+        panel_of(
             surface,
             (f"{surface}_cmd_rad", "command", "demand"),
             (f"{surface}_effective_rad", "effective", f"effective {place}"),
@@ -298,7 +201,7 @@ def detection_panel(axis: str, label: str, role: str = "residual") -> Panel:
     """The residual of the detection estimator on an axis, within its threshold."""
     threshold = f"{axis}_threshold_rad_s"
     bounds = (threshold, "± threshold", "bound"), (threshold, "", "bound", -1.0)
-    return _panel(label, *bounds, (f"{axis}_residual_rad_s", "residual", role))
+    return panel_of(label, *bounds, (f"{axis}_residual_rad_s", "residual", role))
 
 
 def isolation_panel(name: str, axis: str, label: str, threshold: str = "± threshold") -> Panel:
@@ -307,14 +210,14 @@ def isolation_panel(name: str, axis: str, label: str, threshold: str = "± thres
     shade = f"fie_{name}_excluded"
     bounds = (f"{stem}_lower_rad_s", threshold, "bound"), (f"{stem}_upper_rad_s", "", "bound")
     residual = f"{stem}_residual_rad_s", "residual", "actual"
-    return _panel(label, *bounds, residual, shade_column=shade, shade_label="excluded")
+    return panel_of(label, *bounds, residual, shade_column=shade, shade_label="excluded")
 
 
 _DETECTION = View(
     "detection",
     "Detection: the test that raises the alarm (above 1), and the detection estimator",
     (
-        _ratio_panel(
+        ratio_panel(
             "alarm test: |residual| / threshold",
             *((f"{axis}_alarm{RATIO_ENDING}", axis, axis) for axis in AXES),
         ),
@@ -325,7 +228,7 @@ _DETECTION = View(
 _SENSOR_MONITOR = View(
     "watch",
     "Sensor monitor: largest residual between sensors over its bound; above 1 one of them is faulty",
-    (_ratio_panel("largest residual between sensors / bound", ("watch_share", "largest", "actual")),),
+    (ratio_panel("largest residual between sensors / bound", ("watch_share", "largest", "actual")),),
     closeup=True,
 )
 
@@ -341,10 +244,10 @@ def _likelihood_view(columns: Names) -> View:
     steps = [(f"{axis}_step_likelihood_share", f"{axis}'", axis) for axis in AXES]
     panels = (
         *(
-            _ratio_panel(f"loss of {kind or 'a surface'}: test / alarm level", *traces)
+            ratio_panel(f"loss of {kind or 'a surface'}: test / alarm level", *traces)
             for kind, traces in losses.items()
         ),
-        _ratio_panel("step or tone of an acceleration, or its force: test / alarm level", *steps),
+        ratio_panel("step or tone of an acceleration, or its force: test / alarm level", *steps),
     )
     title = "Detection: likelihood ratio tests against their alarm level"
     return View("likelihood", title, panels, closeup=True)
@@ -363,8 +266,8 @@ def _candidates_view(surface_names: Names, estimator_names: Names) -> View:
         if surface
         == max((other for other in surface_names if f"{name}_".startswith(f"{other}_")), key=len, default="")
     ]
-    panel = _panel("surfaces that may be at fault", *traces, bars=True, bars_during_column="detected")
-    panels = (panel,) if traces else ()
+    bars = panel_of("surfaces that may be at fault", *traces, bars=True, bars_during_column="detected")
+    panels = (bars,) if traces else ()
     title = "Candidates: a bar from the alarm until the surface is excluded"
     return View("candidates", title, panels, text_without_data="no alarm: no candidates", closeup=True)
 
@@ -395,7 +298,7 @@ def _ratio_view(names: Names) -> View:
         *((f"{without_underscores(name)} estimator", f"fie_{name}_") for name in names),
     ]
     panels = tuple(
-        _ratio_panel(
+        ratio_panel(
             f"{label}: |residual| / threshold",
             *((f"{stem}{axis}{RATIO_ENDING}", axis, axis) for axis in AXES),
         )
@@ -408,7 +311,7 @@ def _ratio_view(names: Names) -> View:
 def _effectiveness_view(names: Names) -> View:
     """Estimated and used effectiveness of the surfaces, two panels for each kind."""
     panels = tuple(
-        _panel(
+        panel_of(
             f"{kind}: {label}" if kind else label,
             *((f"{name}_effectiveness_{which}", called, role) for name, called, role in group),
             limits=(-0.05, 1.1),
@@ -424,16 +327,16 @@ _SUPERVISOR = View(
     "supervisor",
     "Supervisor: mode, alarm, envelope",
     (
-        _panel("mode", ("mode", "mode", "actual"), value_names=MODES),
-        _panel("alarm", ("detected", "alarm", "actual"), value_names=("quiet", "alarm")),
-        _panel("envelope", ("envelope_valid", "envelope", "actual"), value_names=("outside", "inside")),
+        panel_of("mode", ("mode", "mode", "actual"), value_names=MODES),
+        panel_of("alarm", ("detected", "alarm", "actual"), value_names=("quiet", "alarm")),
+        panel_of("envelope", ("envelope_valid", "envelope", "actual"), value_names=("outside", "inside")),
     ),
 )
 
 
 def _panels_of_columns(*columns: tuple[str, str]) -> tuple[Panel, ...]:
     """A panel for each column, under its name."""
-    return tuple(_panel(label, (column, label, "actual")) for column, label in columns)
+    return tuple(panel_of(label, (column, label, "actual")) for column, label in columns)
 
 
 _ENGINE = View(

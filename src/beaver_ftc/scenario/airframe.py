@@ -1,47 +1,35 @@
-"""What flies in a scenario, where it starts, and the air around it: aircraft, `initial`, `actuators`,
-`environment`.
+"""What flies in a scenario, and where it starts: aircraft, `initial`.
 
 The aircraft is found by what the scenario calls it; names that are its own are checked against it. A
-flight starts from a trimmed flight condition, whose keys depend on the aircraft. The surfaces' actuators
-are ideal, a preset, one set of numbers for all, or one a surface. The air has steady wind, turbulence and
-gusts.
+flight starts from a trimmed flight condition, whose keys depend on the aircraft.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import cache, lru_cache
-from itertools import pairwise
 from math import degrees
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal, Self, get_args
+from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import (
     AfterValidator,
     BeforeValidator,
-    Discriminator,
     Field,
-    GetJsonSchemaHandler,
-    Tag,
     ValidationInfo,
     create_model,
     model_validator,
 )
-from pydantic.json_schema import JsonSchemaValue
-from pydantic_core import CoreSchema
 
 from beaver_ftc.aircraft import DEFAULT, Aircraft, load
 from beaver_ftc.aircraft.aircraft import BESIDE, NotDerived, UnknownAircraft
 from beaver_ftc.documents.document import (
-    Conflict,
     Flag,
     Number,
     Section,
     deny,
     entry,
     number,
-    refuse,
-    refuse_unknown,
 )
 from beaver_ftc.documents.errors import BeaverFtcError, suggestion
 from beaver_ftc.plugins import offered, required
@@ -249,218 +237,3 @@ def initial_schema(schema: dict[str, Any]) -> None:
     """Show an editor the keys of the built-in aircraft."""
     schema.clear()
     schema.update(initial_of(load()).model_json_schema())
-
-
-class ActuatorDynamics(Section):
-    """one surface.
-
-    bandwidth_rad_s: bandwidth of the first-order lag. 0: no lag, rad/s
-    rate_limit_deg_s: largest rate of the surface. 0: no limit, deg/s
-    travel_deg: lower and upper stop; left out: the stops in the aircraft file, deg
-    """
-
-    bandwidth_rad_s: Number = number(0.0, "rad/s", ge=0, le=10_000, examples=[20])
-    rate_limit_deg_s: Number = number(0.0, "deg/s", ge=0, le=100_000, examples=[60])
-    travel_deg: tuple[Number, Number] | None = number(
-        None, "deg", range="rising, -90 to 90", examples=[[-20, 20]]
-    )
-
-    @model_validator(mode="after")
-    def _stops_are_in_order(self) -> Self:
-        if self.travel_deg is not None and not -90 <= self.travel_deg[0] < self.travel_deg[1] <= 90:
-            deny("stops out of order or range, allowed: [lower, upper] from -90 to 90 deg", "travel_deg")
-        return self
-
-    @property
-    def is_ideal(self) -> bool:
-        """No lag and no rate limit; the stops are always there."""
-        return self.bandwidth_rad_s == 0 and self.rate_limit_deg_s == 0
-
-
-PRESETS: dict[str, dict[str, float]] = {
-    "ideal": {},
-    "servo": {"bandwidth_rad_s": 20.0, "rate_limit_deg_s": 60.0},  # rates as in [SL03]
-}
-
-
-class OfSurfaces(Section, extra="allow"):
-    """The same keys for every surface. A key directly in this section applies to all surfaces; one in the
-    section of a surface applies only to this surface."""
-
-    of_one: ClassVar[type[Section]]
-    presets: ClassVar[Mapping[str, dict[str, float]]] = {}
-
-    @model_validator(mode="before")
-    @classmethod
-    def _expand(cls, given: Any) -> Any:
-        if isinstance(given, str):
-            given = cls.presets.get(given, given)
-        return _by_surface(given, tuple(cls.of_one.model_fields)) if isinstance(given, dict) else given
-
-    @classmethod
-    def __get_pydantic_json_schema__(cls, core: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        mapping = handler.resolve_ref_schema(handler(core))
-        reference = mapping["additionalProperties"]
-        one = handler.resolve_ref_schema(reference)
-        mapping["properties"] = {**one["properties"], **dict.fromkeys(load().surfaces, reference)}
-        preset = {"enum": list(cls.presets), "type": "string", "description": "a preset"}
-        return {"anyOf": [preset, mapping]} if cls.presets else mapping
-
-
-class Actuators(OfSurfaces):
-    """A preset, or a key directly in this section, applies to all surfaces. A key of one surface replaces
-    it."""
-
-    __pydantic_extra__: dict[str, ActuatorDynamics]
-    of_one = ActuatorDynamics
-    presets = PRESETS
-
-    @property
-    def is_ideal(self) -> bool:
-        """Whether no surface has a lag or a rate limit."""
-        return all(dynamics.is_ideal for _, dynamics in self)
-
-
-DeadBand = Annotated[Number, Field(ge=0, le=10)]
-
-
-class TrueActuator(Section):
-    """one surface.
-
-    bandwidth: bandwidth, divided by that in `actuators`, 1
-    rate_limit: rate limit, divided by that in `actuators`, 1
-    dead_band_deg: largest distance from the command at which the actuator does not move, deg
-    """
-
-    bandwidth: Number = number(1.0, "1", ge=0.1, le=10, examples=[0.8])
-    rate_limit: Number = number(1.0, "1", ge=0.1, le=10, examples=[0.8])
-    dead_band_deg: DeadBand = number(0.0, "deg", examples=[0.1])
-
-
-class TrueActuators(OfSurfaces):
-    """Actuators of the truth, compared with `actuators`. A key directly in this section applies to all
-    surfaces, a key in the section of a surface only to this surface. An ideal actuator has no bandwidth and
-    no rate limit that could differ."""
-
-    __pydantic_extra__: dict[str, TrueActuator]
-    of_one = TrueActuator
-
-
-def _by_surface(given: dict[str, Any], keys: tuple[str, ...]) -> dict[str, Any]:
-    """Numbers given for all surfaces become each surface's own, unless it has its own already."""
-    surfaces = checked_aircraft().surfaces
-    for_all = {key: value for key, value in given.items() if key in keys}
-    rest = {key: value for key, value in given.items() if key not in for_all}
-    known = (*keys, *surfaces)
-    wrong = [key for key in rest if key not in surfaces]
-    refuse_unknown(wrong, known)
-    own = {surface: rest.get(surface, {}) for surface in surfaces}
-    return {surface: {**for_all, **it} if isinstance(it, dict) else it for surface, it in own.items()}
-
-
-MAX_GUSTS = 100
-Wind = Annotated[Number, Field(ge=-100, le=100)]
-
-
-class Gust(Section):
-    """A gust of JSBSim with the shape one minus cosine. Its velocity rises, stays constant, and falls."""
-
-    at_s: Number = number(..., "s", "start of the gust", ge=0, le=360_000, examples=[10])
-    velocity_mps: tuple[Wind, Wind, Wind] = number(
-        ...,
-        "m/s",
-        "largest velocity, towards north, east and down",
-        examples=[[0, 0, -3]],
-    )
-    rise_s: Number = number(1.0, "s", "duration of the rise", gt=0, le=3600)
-    hold_s: Number = number(0.0, "s", "time at the largest velocity", ge=0, le=3600, examples=[2])
-    fade_s: Number = number(1.0, "s", "duration of the fall", gt=0, le=3600)
-
-    @property
-    def end_s(self) -> float:
-        """When it has faded."""
-        return self.at_s + self.rise_s + self.hold_s + self.fade_s
-
-
-def air_of(severity: str) -> dict[str, str]:
-    """`environment` with turbulence of a severity; or `none`."""
-    return {"turbulence": "none"} if severity == "none" else {"turbulence": "dryden", "severity": severity}
-
-
-def _one_or_several(given: Any) -> str:
-    return "several" if isinstance(given, list | tuple) else "one"
-
-
-Severity = Literal["light", "moderate", "severe"]
-
-
-def _no_severity(given: Any) -> Any:
-    """`turbulence: moderate` is what many write; say where that belongs."""
-    if given in get_args(Severity):
-        deny(f"{given!r} is a severity, allowed: none, or turbulence: dryden with severity: {given}")
-    return given
-
-
-class Environment(Section):
-    """Wind, turbulence and gusts."""
-
-    turbulence: Annotated[Literal["none", "dryden"], BeforeValidator(_no_severity)] = entry(
-        "none",
-        "turbulence of the Dryden model, or none",
-        needs={"severity": "light"},
-        examples=["dryden"],
-    )
-    severity: Severity | None = entry(
-        None, "severity of the turbulence", needs={"turbulence": "dryden"}, examples=["light"]
-    )
-    wind_mps: tuple[Wind, Wind, Wind] = number(
-        (0.0, 0.0, 0.0),
-        "m/s",
-        "steady wind towards north, east and down",
-        examples=[[5, 0, 0]],
-    )
-    gust: (
-        Annotated[
-            Annotated[Gust, Tag("one")]
-            | Annotated[tuple[Gust, ...], Tag("several"), Field(max_length=MAX_GUSTS)],
-            Discriminator(_one_or_several),
-        ]
-        | None
-    ) = entry(
-        None,
-        "one gust, or a list of gusts that do not overlap",
-        examples=[[{"at_s": 10, "velocity_mps": [0, 0, -3]}]],
-    )
-
-    @property
-    def gusts(self) -> tuple[Gust, ...]:
-        """Every gust, in the order in which they start."""
-        if self.gust is None:
-            return ()
-        return (self.gust,) if isinstance(self.gust, Gust) else self.gust
-
-    @property
-    def is_turbulent(self) -> bool:
-        """Whether there is turbulence; then `severity` is given."""
-        return self.turbulence != "none"
-
-    @property
-    def is_still(self) -> bool:
-        """Whether there is no wind, gust or turbulence."""
-        return not (self.is_turbulent or any(self.wind_mps) or self.gusts)
-
-    @model_validator(mode="after")
-    def _fits_together(self) -> Self:
-        if self.is_turbulent and self.severity is None:
-            deny("required key is missing, allowed: light, moderate, severe", "severity")
-        if self.severity is not None and not self.is_turbulent:
-            deny("has no meaning here, allowed: only with turbulence: dryden", "severity")
-        refuse(self._overlapping())
-        return self
-
-    def _overlapping(self) -> Iterator[Conflict]:
-        """JSBSim flies one gust at a time."""
-        for i, (early, late) in enumerate(pairwise(self.gusts), start=1):
-            if late.at_s < early.end_s:
-                allowed = f"allowed: {early.end_s:g} s or later"
-                yield ("gust", i, "at_s"), f"{late.at_s:g} is before the gust before it has faded, {allowed}"

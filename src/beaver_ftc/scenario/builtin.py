@@ -1,21 +1,13 @@
-"""Scenario files as text: those that come with the project, by name, and a scenario back to text.
+"""Files as text: the scenarios, sweeps and plans of evidence that come with the project, by name; none is
+checked here."""
 
-Scenarios, sweeps and plans of evidence come with the project; none is checked here. A scenario is written
-complete and flyable again, or by section, a key to what was computed.
-"""
-
-import re
-from collections.abc import Callable, Hashable, Iterable
 from pathlib import Path
-from typing import Any, Generic, TypeVar
-
-import yaml
-from pydantic import BaseModel
 
 from beaver_ftc.documents.document import first_text
 from beaver_ftc.documents.errors import nearest
 from beaver_ftc.documents.files import data_root
-from beaver_ftc.documents.validation import ScenarioError, parse_document, text_of
+from beaver_ftc.documents.report import ScenarioError
+from beaver_ftc.documents.validation import parse_document, text_of
 
 MAX_BYTES = 4_000_000
 """A hand-written scenario is a few kB; a fully resolved one with reference tables in it stays below this."""
@@ -105,84 +97,3 @@ def is_sweep(path_or_name: str | Path) -> bool:
 def looks_like_a_path(given: str) -> bool:
     """A built-in name has no folder and no dot."""
     return any(mark in given for mark in "/\\.")
-
-
-Found = TypeVar("Found")
-
-
-class KeptBySections(Generic[Found]):
-    """What was found of sections, for further flights that have the same objects.
-
-    Each entry holds its sections, so that their ids stay their own. Of more than `most` entries all are
-    dropped.
-    """
-
-    def __init__(self, most: int) -> None:
-        self._most = most
-        self._entries: dict[tuple[Hashable, ...], tuple[tuple[object, ...], Found]] = {}
-
-    def __len__(self) -> int:
-        return len(self._entries)
-
-    def get(self, sections: tuple[object, ...], find: Callable[[], Found], *besides: Hashable) -> Found:
-        """What `find` returns for these sections, and for these values besides; called if nothing is kept."""
-        key = (*map(id, sections), *besides)
-        if key not in self._entries:
-            if len(self._entries) >= self._most:
-                self._entries.clear()
-            self._entries[key] = sections, find()
-        return self._entries[key][1]
-
-
-_MOST = 256
-_SEPARATORS = re.compile("[\x85\u2028\u2029]")
-_texts: KeptBySections[str] = KeptBySections(_MOST)
-
-
-class _Dumper(yaml.SafeDumper):
-    """Short mappings and lists of numbers on one line, no aliases."""
-
-    def ignore_aliases(self, data: Any) -> bool:
-        return True
-
-
-def _is_leaf(value: Any) -> bool:
-    return not isinstance(value, dict | list)
-
-
-def _mapping(dumper: yaml.SafeDumper, mapping: dict[str, Any]) -> yaml.Node:
-    flow = bool(mapping) and all(map(_is_leaf, mapping.values())) and "description" not in mapping
-    return dumper.represent_mapping("tag:yaml.org,2002:map", mapping.items(), flow_style=flow)
-
-
-def _list(dumper: yaml.SafeDumper, items: list[Any]) -> yaml.Node:
-    return dumper.represent_sequence("tag:yaml.org,2002:seq", items, flow_style=all(map(_is_leaf, items)))
-
-
-def _text(dumper: yaml.SafeDumper, text: str) -> yaml.Node:
-    """Line separators of Unicode are escaped: as they are, they read back as a space."""
-    style = '"' if _SEPARATORS.search(text) else None
-    return dumper.represent_scalar("tag:yaml.org,2002:str", text, style=style)
-
-
-_Dumper.add_representer(str, _text)
-_Dumper.add_representer(dict, _mapping)
-_Dumper.add_representer(list, _list)
-
-
-def to_yaml(scenario: BaseModel) -> str:
-    """The fully resolved scenario, every default written out; loading it again gives an equal one."""
-    data = scenario.model_dump(mode="json", exclude_none=True, by_alias=True)
-    return yaml.dump(data, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=110)
-
-
-def texts_of(scenario: Any, sections: Iterable[str]) -> tuple[str, ...]:
-    """What sections hold, nothing where a scenario has none. Flights of a sweep share those that do not vary,
-    whose text is written once."""
-    return tuple(_text_of(getattr(scenario, name)) for name in sections)
-
-
-def _text_of(section: BaseModel | None) -> str:
-    if section is None:
-        return ""
-    return _texts.get((section,), section.model_dump_json)

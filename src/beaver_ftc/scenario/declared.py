@@ -15,11 +15,12 @@ import numpy as np
 
 from beaver_ftc.aircraft import Aircraft, MassProperties, Term
 from beaver_ftc.design.turbulence import Dryden
-from beaver_ftc.scenario.airframe import Actuators, Initial
-from beaver_ftc.scenario.builtin import KeptBySections
+from beaver_ftc.scenario.actuators import Actuators
+from beaver_ftc.scenario.airframe import Initial
+from beaver_ftc.scenario.autopilot import Autopilot
 from beaver_ftc.scenario.diagnosis import ActuatorBounds, ControlConfig, FdiConfig
+from beaver_ftc.scenario.kept import KeptBySections
 from beaver_ftc.scenario.sensors import NOISE_LIMIT_SIGMA, SIGNALS, Sensors
-from beaver_ftc.scenario.signals import Autopilot
 
 # Relative error of the mass (fuel and load) that is assumed where accelerometers are compared with the forces
 # of the design model. No key of `fdi.bounds` declares it.
@@ -122,7 +123,7 @@ class Declared:
     autopilot: Autopilot | None
     fdi: FdiConfig
     control: ControlConfig
-    design_model: Any  # a `schema.DesignModel`
+    design_model: Any  # a `model_errors.DesignModel`
     servos: Actuators
     instruments: Sensors
 

@@ -7,13 +7,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from beaver_ftc.aircraft import AXES
-from beaver_ftc.documents.document import Document, Problem, Section
+from beaver_ftc.documents.document import Document, Problem, Section, plain
 from beaver_ftc.documents.errors import BadInput, suggestion
-from beaver_ftc.documents.validation import ScenarioError, plain, validate
-from beaver_ftc.scenario.airframe import Gust, checked_against
+from beaver_ftc.documents.report import ScenarioError
+from beaver_ftc.documents.validation import validate
+from beaver_ftc.scenario.air import Gust
+from beaver_ftc.scenario.airframe import checked_against
+from beaver_ftc.scenario.autopilot import Autopilot
+from beaver_ftc.scenario.expect import OF_A_FAULT
 from beaver_ftc.scenario.faults import Fault
-from beaver_ftc.scenario.schema import OF_A_FAULT, Change, Scenario, validate_scenario
-from beaver_ftc.scenario.signals import MAX_ROWS, Autopilot
+from beaver_ftc.scenario.schema import Change, Scenario, validate_scenario
+from beaver_ftc.scenario.signals import MAX_ROWS
 
 STICKS = "sticks.csv"  # what such a table is said to come from; its values are in the scenario itself
 

@@ -1,30 +1,20 @@
 """The scenario file as frozen, typed, strict sections, and how it is read; ranges are the contract's.
 
-Contradictions between sections are looked for in a finished scenario and in a half-wrong file's data
-alike, so that a contradiction is reported along with the mistakes of the sections and not only after they
-are mended. What cannot be read is unknown, for instance because it is itself a mistake, and contradicts
-nothing.
-
 `load` takes a file, a built-in name or a mapping: every mistake at once, one line each.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
-from itertools import pairwise
-from math import isfinite
 from os import PathLike
 from pathlib import Path
 from typing import Annotated, Any, Self
 
 from pydantic import (
     AfterValidator,
-    Discriminator,
-    Field,
     ModelWrapValidatorHandler,
     PlainValidator,
     PrivateAttr,
     SerializeAsAny,
-    Tag,
     ValidationError,
     ValidationInfo,
     model_validator,
@@ -33,9 +23,7 @@ from pydantic import (
 from beaver_ftc.aircraft import DEFAULT, Aircraft, UnknownAircraft
 from beaver_ftc.aircraft import load as load_aircraft
 from beaver_ftc.documents.document import (
-    Conflict,
     Document,
-    Flag,
     Number,
     Problem,
     Section,
@@ -43,25 +31,17 @@ from beaver_ftc.documents.document import (
     deny,
     entry,
     number,
+    plain,
     refuse,
 )
+from beaver_ftc.documents.dotted import UnusableKeyError, parse_key, with_values
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.documents.validation import (
-    ScenarioError,
-    UnusableKeyError,
-    parse_document,
-    parse_key,
-    plain,
-    validate,
-    with_values,
-)
+from beaver_ftc.documents.report import ScenarioError
+from beaver_ftc.documents.validation import parse_document, validate
+from beaver_ftc.scenario.actuators import Actuators
+from beaver_ftc.scenario.air import Environment
 from beaver_ftc.scenario.airframe import (
-    Actuators,
-    Environment,
     Initial,
-    Ratio,
-    Ratios,
-    TrueActuators,
     aircraft_called,
     checked_against,
     default_initial,
@@ -72,215 +52,28 @@ from beaver_ftc.scenario.airframe import (
     known_aircraft,
     left_out,
 )
+from beaver_ftc.scenario.autopilot import Autopilot
 from beaver_ftc.scenario.builtin import read_file, resolve
+from beaver_ftc.scenario.contradictions import DURATION_S, RATE_HZ, conflicts
 from beaver_ftc.scenario.diagnosis import (
     BoundedSensors,
     ControlConfig,
     FdiConfig,
     Law,
     Scheme,
-    changes_refused,
     leaders_missed,
 )
+from beaver_ftc.scenario.expect import Expect
 from beaver_ftc.scenario.faults import (
     MOST_FAULTS,
     Fault,
-    FaultType,
-    Nameable,
-    SensorFault,
-    SurfaceFault,
-    without_effect,
 )
+from beaver_ftc.scenario.model_errors import DesignModel, Uncertainty
+from beaver_ftc.scenario.pairs import changes_refused
 from beaver_ftc.scenario.sensors import Sensors
-from beaver_ftc.scenario.signals import Autopilot, Reference
-
-DURATION_S = 30.0
-RATE_HZ = 100.0
-OF_A_FAULT = (
-    "detected_within_s", "isolated_as", "isolated_type", "candidate_type", "isolated_within_s",
-    "post_fault_rms_deg_s",
-)  # fmt: skip
-# What can be expected of a profile, below `expect`, and the channel of the autopilot it is of.
-_OF_A_PROFILE: dict[tuple[str, ...], str] = {
-    ("altitude_within_m",): "altitude_m",
-    ("airspeed_within_mps",): "airspeed_mps",
-    ("airspeed_within_limits_mps",): "airspeed_mps",
-    ("heading_within_deg",): "heading_deg",
-    **{("arrives", channel): channel for channel in ("altitude_m", "airspeed_mps", "heading_deg")},
-}
-
-Instants = Sequence[float | None]
-
-
-def conflicts(said: Mapping[str, Any]) -> Iterator[Conflict]:
-    """Every contradiction, at the key to change. said: sections by name, faults and changes as they are,
-    others as mappings."""
-    duration_s = _positive(said.get("duration_s", DURATION_S))
-    rate_hz = _positive(said.get("rate_hz", RATE_HZ))
-    faults_s, changes_s = (_instants(said.get(section, [])) for section in ("faults", "changes"))
-    if duration_s and rate_hz and duration_s * rate_hz < 1:
-        yield ("duration_s",), f"{duration_s:g} is less than one frame, allowed: at least {1 / rate_hz:g} s"
-    yield from _too_late("faults", faults_s or (), duration_s)
-    yield from _too_late("changes", changes_s or (), duration_s)
-    yield from _without_effect(said.get("faults", ()))
-    yield from _out_of_order(changes_s or ())
-    expect = said.get("expect")
-    autopilot = said.get("autopilot")
-    if faults_s is not None and not faults_s:
-        yield from _expected_of_no_fault(expect)
-    if isinstance(autopilot, Mapping | None):
-        yield from _expected_of_no_profile(expect, autopilot or {})
-
-
-def _too_late(section: str, starts_s: Instants, end_s: float | None) -> Iterator[Conflict]:
-    for i, at_s in enumerate(starts_s):
-        if at_s and end_s and at_s >= end_s:
-            allowed = f"allowed: earlier than duration_s, {end_s:g} s"
-            yield (section, i, "at_s"), f"{at_s:g} is after the end, {allowed}"
-
-
-def _without_effect(faults: Any) -> Iterator[Conflict]:
-    """What a scenario declares is flown: no fault of a surface that another one masks as it begins."""
-    if isinstance(faults, list | tuple) and all(
-        isinstance(fault, SurfaceFault | SensorFault) for fault in faults
-    ):
-        yield from ((("faults", i, "at_s"), says) for i, says in without_effect(faults))
-
-
-def _out_of_order(changes_s: Instants) -> Iterator[Conflict]:
-    """Changes stand in the order in which they come, so that a reader need not sort them."""
-    for i, (early, late) in enumerate(pairwise(changes_s), start=1):
-        if early and late and late <= early:
-            allowed = f"allowed: later than {early:g} s"
-            yield ("changes", i, "at_s"), f"{late:g} is not after the change before it, {allowed}"
-
-
-def _expected_of_no_fault(expect: Any) -> Iterator[Conflict]:
-    for key in expect if isinstance(expect, Mapping) else ():
-        if key in OF_A_FAULT and expect[key] is not None:
-            yield ("expect", key), "there is no fault to expect it of, allowed: only with faults"
-
-
-def _expected_of_no_profile(expect: Any, autopilot: Mapping[str, Any]) -> Iterator[Conflict]:
-    for path, channel in _OF_A_PROFILE.items():
-        expected = expect
-        for key in path:
-            expected = expected.get(key) if isinstance(expected, Mapping) else None
-        if expected is not None and not autopilot.get(channel):
-            says = f"there is no profile to expect it of, allowed: only with autopilot.{channel}"
-            yield ("expect", *path), says
-
-
-def _instants(given: Any) -> Instants | None:
-    """`at_s` of each entry of a list, None where it is no positive number."""
-    if not isinstance(given, list | tuple):
-        return None
-    return [_positive(e.get("at_s") if isinstance(e, dict) else getattr(e, "at_s", None)) for e in given]
-
-
-def _positive(value: Any) -> float | None:
-    """The value if it is a positive finite number."""
-    number = isinstance(value, int | float) and not isinstance(value, bool)
-    return float(value) if number and 0 < value <= 1e9 and isfinite(value) else None
-
+from beaver_ftc.scenario.signals import Reference
 
 NAME_PATTERN = r"^[A-Za-z0-9_-]+$"
-MOST_NAMES = 20  # of a flight: as many surfaces as an aircraft may have
-
-
-class InertiaCoupling(Section):
-    """Relative errors of the inertia coupling in the truth. The inertia coupling is the angular acceleration
-    that comes from products of two body rates. In the published study [Zhang2005] these errors are at most
-    0.25."""
-
-    p: Number = number(0.0, "share of 1", "coefficient of q r", ge=-1, le=1, examples=[0.2])
-    q: Number = number(0.0, "share of 1", "coefficient of p r", ge=-1, le=1, examples=[0.2])
-    r: Number = number(0.0, "share of 1", "coefficient of p q", ge=-1, le=1, examples=[0.2])
-
-
-class Sinusoid(Section):
-    """amplitude times sin(frequency t), t: time of the flight."""
-
-    amplitude_rad_s2: Number = number(0.0, "rad/s2", "amplitude", ge=0, le=10, examples=[0.02])
-    frequency_rad_s: Number = number(10.0, "rad/s", "angular frequency", gt=0, le=1000)
-
-
-class SinusoidAxes(Section):
-    """One sinusoidal acceleration for each axis."""
-
-    p: Sinusoid = Field(default_factory=Sinusoid)
-    q: Sinusoid = Field(default_factory=Sinusoid)
-    r: Sinusoid = Field(default_factory=Sinusoid)
-
-
-class TrueInertia(Section):
-    """Inertia of the truth, divided by the inertia in the aircraft file."""
-
-    Ix: Number = number(1.0, "1", "roll inertia", ge=0.5, le=2)
-    Iy: Number = number(1.0, "1", "pitch inertia", ge=0.5, le=2)
-    Iz: Number = number(1.0, "1", "yaw inertia", ge=0.5, le=2)
-
-
-Offset = Annotated[Number, Field(ge=-0.5, le=0.5)]
-
-
-class Uncertainty(Section):
-    """Differences between the truth and the design model.
-
-    inertia_coupling: relative errors of the inertia coupling, the acceleration from products of two rates
-
-    sinusoid: a sinusoidal error of each angular acceleration
-    coefficients: factors on aerodynamic terms of the truth, by name
-    mass: mass of the truth, divided by the mass in the aircraft file. The inertia is not changed, 1
-    inertia: inertia of the truth, divided by the inertia in the aircraft file
-
-    cg_m: shift of the true centre of gravity: forward, right, down, m
-    actuators: actuators of the truth, compared with `actuators`
-    """
-
-    inertia_coupling: InertiaCoupling = entry(InertiaCoupling)
-    sinusoid: SinusoidAxes = entry(SinusoidAxes)
-    coefficients: Ratios = entry(dict, examples=[{"Cm_alpha": 1.05}])
-    mass: Number = number(1.0, "1", ge=0.5, le=2)
-    inertia: TrueInertia = entry(TrueInertia)
-    cg_m: tuple[Offset, Offset, Offset] = number((0.0, 0.0, 0.0), "m", examples=[[0.05, 0, 0]])
-    actuators: TrueActuators = entry(TrueActuators, examples=[{"bandwidth": 0.8}])
-
-
-Scale = Annotated[Number, Field(ge=0.1, le=10)]
-
-
-class InertiaScale(Section):
-    """Inertia of the design model, divided by the inertia in the aircraft file."""
-
-    Ix: Scale = number(1.0, "1", "roll inertia")
-    Iy: Scale = number(1.0, "1", "pitch inertia")
-    Iz: Scale = number(1.0, "1", "yaw inertia")
-    Jxz: Ratio = number(1.0, "1", "product of inertia")
-
-
-class DesignModel(Section):
-    """Deliberate errors of the design model. The truth does not change.
-
-    engine_terms: false: no slipstream terms (`dpt`) in Cl, Cm and Cn, as in the published study
-    linearised: true: linearised about the trim at the start
-    frozen_alpha: true: alpha has its trim value
-    mass: mass, divided by that in the aircraft file; the inertia is scaled too, 1
-    inertia: inertia of the design model
-    coefficients: factors on aerodynamic terms, by name
-    actuators: actuators for the diagnosis and the laws. Left out: as `actuators`
-    sensors: sensors as the laws know them, in the forms of `sensors`. Left out: as `sensors`, in a sweep of
-    `sensors` as the base's
-    """
-
-    engine_terms: Flag = True
-    linearised: Flag = False
-    frozen_alpha: Flag = False
-    mass: Scale = number(1.0, "1")
-    inertia: InertiaScale = entry(InertiaScale)
-    coefficients: Ratios = entry(dict, examples=[{"Cm_alpha": 0.9}])
-    actuators: Actuators | None = entry(None, examples=["servo"])
-    sensors: Sensors | None = entry(None, examples=["tactical-grade"])
 
 
 class Change(Section):
@@ -308,76 +101,6 @@ class Change(Section):
         if all(value is None for value in said):
             deny("says no change, allowed: law, scheme, sensors or declared_sensors")
         return self
-
-
-class RmsLimits(Section):
-    """Largest allowed root mean square (RMS) of the tracking error on each axis."""
-
-    p: Number | None = number(None, "deg/s", "roll rate", ge=0, le=1000, examples=[1.5])
-    q: Number | None = number(None, "deg/s", "pitch rate", ge=0, le=1000, examples=[1.5])
-    r: Number | None = number(None, "deg/s", "yaw rate", ge=0, le=1000, examples=[1.5])
-
-
-class Arrival(Section):
-    """Largest allowed deviations from the commanded flight path at the end of the flight. Before the
-    check, a first-order lag with a time constant of 10 s smooths each deviation."""
-
-    altitude_m: Number | None = number(None, "m", "altitude", gt=0, le=10_000, examples=[10])
-    airspeed_mps: Number | None = number(None, "m/s", "airspeed", gt=0, le=100, examples=[2])
-    heading_deg: Number | None = number(None, "deg", "heading", gt=0, le=180, examples=[5])
-    in_envelope: Flag | None = entry(None, "whether the flight must end inside the validated envelope")
-
-
-def _one_or_list(given: Any) -> str:
-    return "(list)" if isinstance(given, list | tuple) else "(one)"
-
-
-Names = Annotated[tuple[Nameable, ...], Field(max_length=MOST_NAMES)]
-
-
-class Expect(Section):
-    """Conditions that the flight must meet. A condition that is left out is not checked.
-
-    detected_within_s: largest time from the fault to the first alarm, s
-    isolated_as: name that the diagnosis must give: a surface, an instrument such as `sensor p`, or
-    `unanticipated`. A list has one name for each fault, in their order
-    isolated_type: fault type that the diagnosis must name
-    candidate_type: fault type that must be named or stay possible
-    isolated_within_s: largest time from the fault to its name, s
-    no_false_alarm: whether no alarm may come before the first fault
-    no_departure: whether the aircraft must survive
-    pre_fault_rms_deg_s: largest RMS tracking error before the fault, without a fault of the whole flight
-    post_fault_rms_deg_s: largest RMS tracking error after the fault
-    altitude_within_m: largest deviation from the commanded altitude, m
-    airspeed_within_mps: largest deviation from the commanded airspeed, after a lag of 10 s, m/s
-    airspeed_within_limits_mps: as `airspeed_within_mps`, with a command that the aircraft can hold after the
-    fault, m/s
-    heading_within_deg: largest deviation from the commanded heading, without 30 s after each change, deg
-    stays_in_envelope: whether the flight must stay inside the validated envelope
-    arrives: largest deviations from the flight path at the end, after a lag of 10 s. A lost aircraft does
-    not arrive
-    """
-
-    detected_within_s: Number | None = number(None, "s", ge=0, le=360_000, examples=[0.5])
-    isolated_as: (
-        Annotated[
-            Annotated[Nameable, Tag("(one)")] | Annotated[Names, Tag("(list)")], Discriminator(_one_or_list)
-        ]
-        | None
-    ) = entry(None, examples=["elevator", ["elevator", "rudder"]])
-    isolated_type: FaultType | None = None
-    candidate_type: FaultType | None = None
-    isolated_within_s: Number | None = number(None, "s", ge=0, le=360_000, examples=[2])
-    no_false_alarm: Flag | None = None
-    no_departure: Flag | None = None
-    pre_fault_rms_deg_s: RmsLimits | None = None
-    post_fault_rms_deg_s: RmsLimits | None = None
-    altitude_within_m: Number | None = number(None, "m", gt=0, le=10_000, examples=[25])
-    airspeed_within_mps: Number | None = number(None, "m/s", gt=0, le=100, examples=[3.5])
-    airspeed_within_limits_mps: Number | None = number(None, "m/s", gt=0, le=100, examples=[2])
-    heading_within_deg: Number | None = number(None, "deg", gt=0, le=180, examples=[6])
-    stays_in_envelope: Flag | None = None
-    arrives: Arrival | None = None
 
 
 class Scenario(Section, title="beaver-ftc scenario"):

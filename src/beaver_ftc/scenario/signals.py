@@ -1,29 +1,21 @@
-"""What is to be flown in time: body rates (`reference:`) and the flight path (`autopilot:`); and instants as
-frames.
+"""Body rates to be flown in time (`reference:`): one class a kind, its parameters and `rate_deg_s(t_s)`.
 
-Body rates: one class a kind, its parameters and `rate_deg_s(t_s)`. tau = t - start_s; every signal but the
-table is zero before `start_s` and, but for the ramp, from `end_s` on. A new kind is a class here and a
-line in `Signal`. A table comes from a CSV file: of bounded size, in the scenario's own folder, time
-increasing.
-
-The flight path: altitude, airspeed, heading or bank in time, a list of legs each.
+tau = t - start_s; every signal but the table is zero before `start_s` and, but for the ramp, from `end_s` on.
+A new kind is a class here and a line in `Signal`. A table comes from a CSV file: of bounded size, in the
+scenario's own folder, time increasing.
 """
 
 import csv as csv_files
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from functools import lru_cache
 from itertools import pairwise
-from math import ceil, exp, inf, isfinite, pi
+from math import isfinite, pi
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
-from pydantic import ConfigDict, Field, ValidationInfo, model_validator
+from pydantic import ConfigDict, ValidationInfo, model_validator
 
-from beaver_ftc.aircraft import Aircraft
-from beaver_ftc.aircraft.aircraft import THRUST_TERM
 from beaver_ftc.documents.document import (
-    Conflict,
-    Flag,
     Number,
     Section,
     deny,
@@ -33,7 +25,8 @@ from beaver_ftc.documents.document import (
     refuse,
 )
 from beaver_ftc.documents.files import UnreadableError, inside, read_text
-from beaver_ftc.scenario.airframe import airspeeds_of, checked_aircraft, folder_of, highest_of
+from beaver_ftc.scenario.airframe import folder_of
+from beaver_ftc.scenario.instants import LATEST_S, TIME_TOLERANCE_S
 
 if TYPE_CHECKING:
     import numpy as np
@@ -42,45 +35,7 @@ if TYPE_CHECKING:
     Samples = NDArray[np.float64]
 
 
-# Frame times are k / rate_hz in floating point: what happens at t is in force in the first frame whose time
-# is not before t - TIME_TOLERANCE_S.
-TIME_TOLERANCE_S = 1e-9
-
-MEAN_S = 10.0  # time constant of the mean by which airspeed and arrival are judged: a gust passes faster
-
-
-def is_before(t_s: Any, at_s: float) -> Any:
-    """Whether a time (or each of several) is before that instant, by more than rounding."""
-    return t_s < at_s - TIME_TOLERANCE_S
-
-
-def is_in_force(fault: Any, t_s: Any) -> Any:
-    """Whether a fault is there at a time, or at each of several: begun, and neither repaired nor over."""
-    ends_s = inf if fault.end_s is None else fault.end_s
-    return (t_s >= fault.at_s - TIME_TOLERANCE_S) & is_before(t_s, ends_s)
-
-
-def grown_share(fault: Any, t_s: float) -> float:
-    """B(t - T0), 0 to 1: how far a fault that has begun has grown [Zhang2005]."""
-    if fault.profile != "incipient":
-        return 1.0
-    return 1.0 - exp(-fault.kappa_per_s * max(0.0, t_s - fault.at_s))
-
-
-def frame_of(time_s: float, rate_hz: float) -> int:
-    """The first frame k whose time k / rate_hz is not before time_s."""
-    return ceil((time_s - TIME_TOLERANCE_S) * rate_hz)
-
-
-def first_frame_s(time_s: float, rate_hz: float) -> float:
-    """Time, s, of that frame."""
-    return frame_of(time_s, rate_hz) / rate_hz
-
-
 RAD_PER_DEG = pi / 180.0
-
-_LATEST_S = 360_000.0
-
 MAX_ROWS = 20_000
 _MAX_BYTES = 2_000_000
 _LARGEST_DEG_S = 1000.0
@@ -96,7 +51,7 @@ def _frequency(says: str = "frequency") -> Any:
 
 
 def _start() -> Any:
-    return number(0.0, "s", "start of the signal", ge=0, le=_LATEST_S, examples=[5])
+    return number(0.0, "s", "start of the signal", ge=0, le=LATEST_S, examples=[5])
 
 
 def _during(tau_s: "Samples", length_s: float | None) -> "NDArray[np.bool_]":
@@ -150,7 +105,7 @@ class Doublet(Section):
 
     amplitude_deg_s: Number = _amplitude()
     start_s: Number = _start()
-    width_s: Number = number(1.0, "s", "length of each pulse", gt=0, le=_LATEST_S)
+    width_s: Number = number(1.0, "s", "length of each pulse", gt=0, le=LATEST_S)
 
     def rate_deg_s(self, t_s: "Samples") -> "Samples":
         tau_s = t_s - self.start_s
@@ -186,7 +141,7 @@ class Square(_Wave):
 class _Closed(_Window):
     """A signal that needs both its ends."""
 
-    end_s: Number = number(..., "s", "end of the signal", gt=0, le=_LATEST_S, examples=[20])
+    end_s: Number = number(..., "s", "end of the signal", gt=0, le=LATEST_S, examples=[20])
 
     @property
     def length_s(self) -> float:
@@ -331,8 +286,8 @@ def check_table(time_s: Sequence[float], values_deg_s: Sequence[float]) -> None:
     """Refuse columns of different length, times that do not increase, values that no aircraft flies."""
     if len(time_s) != len(values_deg_s):
         deny(f"{len(time_s)} times but {len(values_deg_s)} values, allowed: as many of each")
-    if not all(a < b for a, b in pairwise(time_s)) or time_s[0] < 0 or time_s[-1] > _LATEST_S:
-        deny(f"times do not increase from 0, allowed: strictly increasing, 0 to {_LATEST_S:g} s")
+    if not all(a < b for a, b in pairwise(time_s)) or time_s[0] < 0 or time_s[-1] > LATEST_S:
+        deny(f"times do not increase from 0, allowed: strictly increasing, 0 to {LATEST_S:g} s")
     if max(map(abs, values_deg_s)) > _LARGEST_DEG_S:
         deny(f"rates out of range, allowed: -{_LARGEST_DEG_S:g} to {_LARGEST_DEG_S:g} deg/s")
 
@@ -408,123 +363,3 @@ def sample_deg_s(reference: Reference, t_s: "Samples") -> "Samples":
     still = np.zeros_like(t_s)
     axes = [sum((item.shape.rate_deg_s(t_s) for item in axis), still) for _, axis in reference]
     return np.column_stack(axes)
-
-
-MAX_LEGS = 100
-
-
-class _Leg(Section):
-    """From a time on: a value, or hold what is flown."""
-
-    at_s: Number = number(0.0, "s", "start of the leg", ge=0, le=_LATEST_S, examples=[10])
-    hold: Flag = entry(
-        False,
-        "true: hold the commanded or, if there is none, the present value. Otherwise `value` is required",
-    )
-    value: Number | None = None
-
-    @model_validator(mode="after")
-    def _either_hold_or_value(self) -> Self:
-        if self.hold and self.value is not None:
-            deny("contradicts value, allowed: one of the two", "hold")
-        if not self.hold and self.value is None:
-            deny("required key is missing, allowed: value, or hold: true", "value")
-        low, high = self._ends(checked_aircraft())
-        if self.value is not None and not low <= self.value <= high:
-            says = type(self).model_fields["value"].description
-            allowed = f"allowed: a number from {low:g} to {high:g} ({says})"
-            deny(f"{self.value:g} is out of range, {allowed}", "value")
-        return self
-
-    def _ends(self, aircraft: Aircraft) -> tuple[float, float]:
-        """Between what values this aircraft can be asked for it, where that depends on it."""
-        return -inf, inf
-
-
-# Ranges as they are shown, for the usual aircraft; those of the scenario's own aircraft count (`_ends`).
-_Altitude = Annotated[Number, Field(json_schema_extra={"maximum": 6000, "minimum": -300})]
-_Airspeed = Annotated[Number, Field(json_schema_extra={"maximum": 70, "minimum": 20})]
-
-
-class AltitudeLeg(_Leg):
-    """A commanded altitude. The command changes to the new value at a constant rate of climb or descent."""
-
-    value: _Altitude | None = number(None, "m", "altitude above sea level", examples=[1900])
-    climb_mps: Number = number(2.5, "m/s", "rate of climb or descent", gt=0, le=10)
-
-    def _ends(self, aircraft: Aircraft) -> tuple[float, float]:
-        return -300.0, highest_of(aircraft)
-
-
-class AirspeedLeg(_Leg):
-    """A commanded airspeed. The command changes to the new value at a constant acceleration."""
-
-    value: _Airspeed | None = number(None, "m/s", "true airspeed", examples=[45])
-    change_mps2: Number = number(0.2, "m/s2", "acceleration of the command", gt=0, le=5)
-
-    def _ends(self, aircraft: Aircraft) -> tuple[float, float]:
-        return airspeeds_of(aircraft)
-
-
-class HeadingLeg(_Leg):
-    """A commanded true heading. The aircraft takes the shorter turn."""
-
-    value: Number | None = number(None, "deg", "true heading", ge=-360, le=360, examples=[90])
-
-
-class BankLeg(_Leg):
-    """A commanded bank angle, positive with the right wing down."""
-
-    value: Number | None = number(None, "deg", "bank angle", ge=-45, le=45, examples=[20])
-
-
-def channels_of(aircraft: Aircraft) -> tuple[str, ...]:
-    """What can be flown with an aircraft."""
-    by = aircraft.airspeed_by
-    refused = {"power": (), "pitch": ("altitude_m",), "": ("airspeed_mps",)}[by]
-    return tuple(name for name in Autopilot.model_fields if name not in refused)
-
-
-def _legs(says: str) -> Any:
-    return entry((), says, max_length=MAX_LEGS)
-
-
-class Autopilot(Section):
-    """Each quantity has a list of legs. From its time `at_s`, a leg sets a new `value`, or with `hold:
-    true` keeps the present value. A quantity that is left out is not controlled."""
-
-    altitude_m: tuple[AltitudeLeg, ...] = _legs("altitude")
-    airspeed_mps: tuple[AirspeedLeg, ...] = _legs(
-        "true airspeed. Engine power holds it; without an engine, pitch"
-    )
-    heading_deg: tuple[HeadingLeg, ...] = _legs("true heading")
-    bank_deg: tuple[BankLeg, ...] = _legs("bank angle")
-
-    @model_validator(mode="after")
-    def _fits_together(self) -> Self:
-        refuse(self._conflicts())
-        return self
-
-    def _conflicts(self) -> Iterator[Conflict]:
-        for name, legs in self:
-            for i, (before, leg) in enumerate(pairwise(legs), start=1):
-                if leg.at_s <= before.at_s:
-                    says = f"{leg.at_s:g} is not after {before.at_s:g}, allowed: legs in order"
-                    yield (name, i, "at_s"), says
-        if self.heading_deg and self.bank_deg:
-            yield ("bank_deg",), "contradicts heading_deg, allowed: one of the two"
-        aircraft = checked_aircraft()
-        known = channels_of(aircraft)
-        why = {
-            "airspeed_mps": f"the file of {aircraft.name} does not say what thrust does (no engine.thrust, "
-            f"and no term {THRUST_TERM} among its forces), so no airspeed can be held",
-            "altitude_m": f"{aircraft.name} has no steady thrust, so it glides: no altitude can be held",
-        }
-        for name in self.channels:
-            if name not in known:
-                yield (name,), f"{why[name]}, allowed: {', '.join(known)}"
-
-    @property
-    def channels(self) -> tuple[str, ...]:
-        """The channels with something to fly."""
-        return tuple(name for name, legs in self if legs)

@@ -27,16 +27,10 @@ from beaver_ftc.documents.document import (
     number,
     refuse,
 )
+from beaver_ftc.documents.dotted import UnusableKeyError, parse_key, with_values
 from beaver_ftc.documents.files import inside
-from beaver_ftc.documents.validation import (
-    ScenarioError,
-    UnusableKeyError,
-    key_path,
-    parse_document,
-    parse_key,
-    validate,
-    with_values,
-)
+from beaver_ftc.documents.report import ScenarioError, key_path
+from beaver_ftc.documents.validation import parse_document, validate
 from beaver_ftc.scenario.airframe import checked_against
 from beaver_ftc.scenario.builtin import (
     builtin_names,

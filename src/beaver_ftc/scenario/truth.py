@@ -5,9 +5,12 @@ from dataclasses import dataclass
 from typing import Self
 
 from beaver_ftc.aircraft import Aircraft
-from beaver_ftc.scenario.airframe import Actuators, Environment, Initial, checked_against
+from beaver_ftc.scenario.actuators import Actuators
+from beaver_ftc.scenario.air import Environment
+from beaver_ftc.scenario.airframe import Initial, checked_against
 from beaver_ftc.scenario.declared import Declared
-from beaver_ftc.scenario.schema import Scenario, Uncertainty
+from beaver_ftc.scenario.model_errors import Uncertainty
+from beaver_ftc.scenario.schema import Scenario
 
 
 @dataclass(frozen=True)

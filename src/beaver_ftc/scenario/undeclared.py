@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.aircraft.aircraft import MOMENTS
 from beaver_ftc.design.turbulence import Dryden
-from beaver_ftc.scenario.builtin import KeptBySections
 from beaver_ftc.scenario.declared import MASS_TOLERANCE, Declared
+from beaver_ftc.scenario.kept import KeptBySections
 from beaver_ftc.scenario.sensors import PRESETS, Sensors
 
 _FORCES = ("CY", "CZ")  # begin the names of the coefficients that accelerometers are compared with

@@ -10,14 +10,15 @@ from math import pi
 from typing import Any
 
 from beaver_ftc.aircraft import AXES, Aircraft
-from beaver_ftc.scenario.diagnosis import FdiConfig, failing, of_several
+from beaver_ftc.scenario.diagnosis import FdiConfig
+from beaver_ftc.scenario.expect import OF_DIAGNOSIS
 from beaver_ftc.scenario.faults import LOSS_OF_EFFECTIVENESS, UNANTICIPATED, of_a_sensor, place_of
 from beaver_ftc.scenario.measured_range import ALTITUDE, LATE, lies_outside, measured_spans, outside
+from beaver_ftc.scenario.pairs import failing, of_several
 from beaver_ftc.scenario.sensors import sensor_words
 from beaver_ftc.scenario.signals import Chirp
 from beaver_ftc.scenario.undeclared import undeclared
 
-OF_DIAGNOSIS = ("detected_within_s", "isolated_as", "isolated_within_s", "isolated_type", "candidate_type")
 FULL_SHARE = 0.02  # of the range of a power setting: so close to its upper end it is full power
 
 

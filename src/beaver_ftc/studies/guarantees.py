@@ -14,7 +14,7 @@ from beaver_ftc.loop.outcome import Landing
 from beaver_ftc.results.judgement import Truth, is_late
 from beaver_ftc.results.metrics import fault_free_s
 from beaver_ftc.scenario.faults import LossOfEffectiveness
-from beaver_ftc.scenario.signals import grown_share
+from beaver_ftc.scenario.instants import grown_share
 from beaver_ftc.studies.random_flights import Draw
 
 PUBLISHED, SHARPENED = "published", "sharpened"

@@ -12,7 +12,7 @@ from beaver_ftc.aircraft.aircraft import read
 from beaver_ftc.control import engines
 from beaver_ftc.control.power import POWER, move_differences
 from beaver_ftc.control.state import control_dtype
-from beaver_ftc.documents.validation import ScenarioError
+from beaver_ftc.documents.report import ScenarioError
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.instrumented import source_of
 from beaver_ftc.plant.trim import trim

@@ -1,6 +1,7 @@
 import pytest
 
-from beaver_ftc.documents.validation import ScenarioError, parse_key, with_values
+from beaver_ftc.documents.dotted import parse_key, with_values
+from beaver_ftc.documents.report import ScenarioError
 from beaver_ftc.scenario.airframe import checked_against
 from beaver_ftc.scenario.builtin import builtin_sweeps
 from beaver_ftc.scenario.schema import Scenario

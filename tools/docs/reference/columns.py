@@ -13,7 +13,7 @@ from beaver_ftc.control.profile import COLUMNS as PROFILE
 from beaver_ftc.diagnosis.isolation import estimator_names
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.plant.channels import log_columns
-from beaver_ftc.results.log import unit_of
+from beaver_ftc.results.units import unit_of
 from beaver_ftc.studies.detectability import levels, places
 from beaver_ftc.studies.detectability.grid import WITHIN_S
 from beaver_ftc.studies.mismatch import documents, split

@@ -10,7 +10,7 @@ import yaml
 from beaver_ftc.aircraft import load
 from beaver_ftc.aircraft.schema import AircraftFile
 from beaver_ftc.plugins import DETECTORS, LAWS, options_of, registered
-from beaver_ftc.scenario import airframe, sensors
+from beaver_ftc.scenario import actuators, sensors
 from beaver_ftc.scenario.schema import json_schema
 from beaver_ftc.scenario.sweeps import sweep_json_schema
 from beaver_ftc.studies.present.tables import markdown_table
@@ -313,7 +313,7 @@ def _of_scenarios() -> Iterator[str]:
             for name, of in options_of(group, one.name).items()
         ]
         yield markdown_table((what, "option", "meaning", "value", "default"), rows)
-    for what, presets in (("sensors", sensors.PRESETS), ("actuators", airframe.PRESETS)):
+    for what, presets in (("sensors", sensors.PRESETS), ("actuators", actuators.PRESETS)):
         yield f"## Presets of `{what}`"
         rows = [(f"`{name}`", *each) for name, of in presets.items() for each in _preset(of)]
         yield markdown_table(("preset", what, "values"), rows)

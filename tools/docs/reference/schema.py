@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from math import ceil, floor
 from typing import Any
 
-from beaver_ftc.results.log import unit_of
+from beaver_ftc.results.units import unit_of
 from tools.schema import Node, inlined
 
 Path = tuple[str, ...]

@@ -6,9 +6,9 @@ from tempfile import TemporaryDirectory
 from beaver_ftc.results.figures import draw
 from beaver_ftc.results.log import StoredLog
 from beaver_ftc.results.model import Metrics
+from beaver_ftc.results.panels import Panel, Trace, View
 from beaver_ftc.results.series import series_of
 from beaver_ftc.results.style import marks
-from beaver_ftc.results.views import Panel, Trace, View
 from beaver_ftc.results.writer import run
 from beaver_ftc.scenario.schema import load_scenario
 from tools.docs.tables import picture

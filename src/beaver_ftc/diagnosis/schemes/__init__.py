@@ -34,7 +34,7 @@ from beaver_ftc.diagnosis.state import (
 from beaver_ftc.diagnosis.types import records
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.scenario.declared import Declared
-from beaver_ftc.scenario.diagnosis import pairs_refused
+from beaver_ftc.scenario.pairs import pairs_refused
 
 
 @sized

@@ -203,7 +203,7 @@ def find_alarm_axis(fdi, y, t):
 @apart
 def plugin_update(fdi, measured, t):
     """Take the plug-in's verdict, fdi.plugin_verdict. Its theta replaces that of the isolated estimator; an
-    estimator has the number of its surface here (loop/plugin_frame.py)."""
+    estimator has the number of its surface here (loop/plugin_setup.py)."""
     fdae.fdae_residual(fdi.fdae, measured.x)
     conclusion.record_plugin_verdict(fdi.verdict, fdi.plugin_verdict, t)
     if fdi.verdict.isolated_estimator >= 0:

@@ -21,8 +21,8 @@ from pydantic import Discriminator, Field, Tag, model_validator
 from beaver_ftc.documents.document import Conflict, Number, Section, entry, number, order_conflicts, refuse
 from beaver_ftc.documents.errors import suggestion
 from beaver_ftc.scenario.airframe import Actuator, among, checked_aircraft, named
+from beaver_ftc.scenario.instants import grown_share, is_in_force
 from beaver_ftc.scenario.sensors import AnySensorFault, SensorFault, fault_name, sensor_words, sensors_there
-from beaver_ftc.scenario.signals import grown_share, is_in_force
 
 Keys = Mapping[str, Any]  # of a fault in a scenario, beside type, actuator and times
 Properties = dict[str, float]  # failure properties of one surface

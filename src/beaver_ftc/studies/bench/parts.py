@@ -48,7 +48,7 @@ PARTS: dict[str, dict[str, Kernel]] = {
     "reading": {"plant.sensing.measure": nothing, "plant.sensing.flight_status": flying},
     # the design model, the detection estimator and its bank of filters
     "fdae": {
-        "design.model.response": nothing, "loop.accounts.effect_of_faults": nothing,
+        "design.model.response": nothing, "loop.guarantee.effect_of_faults": nothing,
         "diagnosis.model_prediction.evaluate_frame": nothing, "loop.frame.diagnose": nothing,
     },
     # the isolation estimators, and the decision among them

@@ -8,7 +8,7 @@ from typing import Any
 
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.documents.validation import one_line
+from beaver_ftc.documents.report import one_line
 from beaver_ftc.results.model import Document, Metrics, read_metrics
 from beaver_ftc.results.style import BLACK
 from beaver_ftc.studies.present.figures import Figure, panels

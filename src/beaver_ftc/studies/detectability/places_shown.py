@@ -6,8 +6,8 @@ from operator import itemgetter
 
 import numpy as np
 
-from beaver_ftc.results.expectations import MOTION_OF_AXIS
 from beaver_ftc.results.model import Document
+from beaver_ftc.results.words import MOTION_OF_AXIS
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.detectability.certain import AMPLITUDES, DETECT_WITHIN_S, ISOLATE_WITHIN_S, axis_of
 from beaver_ftc.studies.detectability.figures import draw_pairs

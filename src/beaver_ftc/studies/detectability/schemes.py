@@ -18,7 +18,8 @@ from beaver_ftc.diagnosis.rivals.gust import VaneGust
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError
 from beaver_ftc.documents.files import Document
 from beaver_ftc.plugins import DETECTORS, is_compiled, refusal, registered
-from beaver_ftc.scenario.airframe import air_of, find_aircraft
+from beaver_ftc.scenario.air import air_of
+from beaver_ftc.scenario.airframe import find_aircraft
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.compare import replay
 from beaver_ftc.studies.compare.replay import Recording, Trace

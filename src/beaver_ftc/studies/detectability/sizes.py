@@ -21,8 +21,8 @@ from beaver_ftc.documents.errors import BadInput, BeaverFtcError
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.metrics import measure, versions
 from beaver_ftc.results.model import Document
+from beaver_ftc.scenario.instants import TIME_TOLERANCE_S
 from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.scenario.signals import TIME_TOLERANCE_S
 from beaver_ftc.studies.detectability import sizes_shown
 from beaver_ftc.studies.detectability.certain import SETTLED_S
 from beaver_ftc.studies.detectability.shown import NAME

@@ -23,7 +23,8 @@ from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.trim import trim
 from beaver_ftc.results.metrics import measure
 from beaver_ftc.results.model import Document, Metrics
-from beaver_ftc.scenario.airframe import air_of, find_aircraft, initial_of
+from beaver_ftc.scenario.air import air_of
+from beaver_ftc.scenario.airframe import find_aircraft, initial_of
 from beaver_ftc.scenario.faults import TYPES
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.schema import load as load_scenario

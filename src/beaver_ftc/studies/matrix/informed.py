@@ -74,7 +74,7 @@ def _declared(scenario: "Scenario") -> tuple[Context, np.ndarray]:
     """The context of a flight with exact coefficients, and the absolute tolerances of the coefficients. If
     the diagnosis subtracts the gust that the vanes measure, the context has the measured gust."""
     from beaver_ftc.loop.loop import Loop
-    from beaver_ftc.loop.plugin_frame import context_of
+    from beaver_ftc.loop.plugin_context import context_of
     from beaver_ftc.loop.readout import FrameReadout
 
     loop = Loop(scenario)

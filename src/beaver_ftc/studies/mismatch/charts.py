@@ -11,10 +11,10 @@ import numpy as np
 
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.documents.files import Document
-from beaver_ftc.results.expectations import MOTION_OF_AXIS, without_underscores
 from beaver_ftc.results.log import StoredLog
 from beaver_ftc.results.series import series_of
 from beaver_ftc.results.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION, Mark
+from beaver_ftc.results.words import MOTION_OF_AXIS, without_underscores
 from beaver_ftc.studies.mismatch.linear_charts import dress
 from beaver_ftc.studies.mismatch.sources import SOURCES
 from beaver_ftc.studies.mismatch.split import CAUSES, ETA_BAR, FAULT, TOTAL, UNEXPLAINED, column

@@ -60,8 +60,8 @@ from beaver_ftc.plant.adapter import START_LATITUDE_DEG
 from beaver_ftc.plant.conditions import known_trim
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.faults import UNANTICIPATED, place_of
+from beaver_ftc.scenario.instants import grown_share, is_before, is_in_force
 from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.scenario.signals import grown_share, is_before, is_in_force
 from beaver_ftc.studies.mismatch.actuators import healthy_positions
 from beaver_ftc.studies.mismatch.states import States
 

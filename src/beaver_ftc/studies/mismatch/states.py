@@ -9,7 +9,7 @@ from beaver_ftc.aircraft import AXES
 from beaver_ftc.aircraft.aircraft import N_PER_LBF
 from beaver_ftc.design.fdc import SURFACES
 from beaver_ftc.loop.loop import Loop
-from beaver_ftc.loop.plugin_frame import measured_of
+from beaver_ftc.loop.plugin_context import measured_of
 
 Log = Mapping[str, np.ndarray]
 

@@ -5,9 +5,9 @@ from pathlib import Path
 
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.documents.files import read_json
-from beaver_ftc.results.expectations import value_text, without_underscores
 from beaver_ftc.results.model import Document
 from beaver_ftc.results.terminal import printed
+from beaver_ftc.results.words import value_text, without_underscores
 from beaver_ftc.studies.engine.statistics import or_never
 from beaver_ftc.studies.present import page
 from beaver_ftc.studies.present.tables import number, plain, seconds, tabulated

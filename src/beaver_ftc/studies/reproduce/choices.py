@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from beaver_ftc.documents.document import parse
+from beaver_ftc.documents.dotted import parse_key, with_values
 from beaver_ftc.documents.files import Document
-from beaver_ftc.documents.validation import parse_key, with_values
 from beaver_ftc.plugins import DETECTORS, LAWS, options_of
 from beaver_ftc.scenario.schema import Scenario
 

@@ -5,16 +5,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from beaver_ftc.results.figures import draw
+from beaver_ftc.results.panels import Panel, Trace, View
 from beaver_ftc.results.style import marks
-from beaver_ftc.results.views import (
-    AXES,
-    AXIS_NAMES,
-    Panel,
-    Trace,
-    View,
-    detection_panel,
-    isolation_panel,
-)
+from beaver_ftc.results.views import AXES, AXIS_NAMES, detection_panel, isolation_panel
 from beaver_ftc.studies.present.page import Files, Summary
 from beaver_ftc.studies.reproduce.choices import FAULT_AT_S
 from beaver_ftc.studies.reproduce.flown import Flown

@@ -18,10 +18,12 @@ from beaver_ftc.aircraft import AXES
 from beaver_ftc.design.turbulence import SEVERITIES
 from beaver_ftc.documents.document import Section
 from beaver_ftc.results.model import Document
-from beaver_ftc.scenario.airframe import TrueActuator, air_of
+from beaver_ftc.scenario.actuators import TrueActuator
+from beaver_ftc.scenario.air import air_of
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.diagnosis import ActuatorBound
-from beaver_ftc.scenario.schema import Scenario, Sinusoid, TrueInertia
+from beaver_ftc.scenario.model_errors import Sinusoid, TrueInertia
+from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.sensors import PRESETS, Sensors
 from beaver_ftc.studies.present.tables import values_of
 

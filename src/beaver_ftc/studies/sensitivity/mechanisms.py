@@ -18,7 +18,7 @@ from beaver_ftc.aircraft import AXES
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.log import Columns
 from beaver_ftc.results.model import Document
-from beaver_ftc.scenario.airframe import air_of
+from beaver_ftc.scenario.air import air_of
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.compare.criteria import least_margins
 from beaver_ftc.studies.compare.margins_in_flight import margins_of

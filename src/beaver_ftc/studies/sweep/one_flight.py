@@ -17,9 +17,10 @@ from typing import TYPE_CHECKING, Any
 from pydantic import ValidationError
 
 from beaver_ftc.documents import document as source
+from beaver_ftc.documents.allowed import problems_of
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError
 from beaver_ftc.documents.files import Document
-from beaver_ftc.documents.validation import key_path, problems_of
+from beaver_ftc.documents.report import key_path
 from beaver_ftc.results.model import Metrics
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.sweeps import Sweep, Variation
@@ -194,7 +195,7 @@ def keep_flight(sweep: Sweep, assignment: Assignment, keep: Keep, report: bool =
     has one."""
     from beaver_ftc.results.folder import result_folder
     from beaver_ftc.results.writer import NotAllWritten, run
-    from beaver_ftc.scenario.builtin import to_yaml
+    from beaver_ftc.scenario.dump import to_yaml
 
     try:
         scenario = scenario_of(sweep, assignment)

@@ -20,7 +20,7 @@ from beaver_ftc.documents.files import Document
 from beaver_ftc.results.expectations import expected_of
 from beaver_ftc.results.log import Columns
 from beaver_ftc.results.metrics import as_json, measure, versions
-from beaver_ftc.scenario.builtin import to_yaml
+from beaver_ftc.scenario.dump import to_yaml
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.sweeps import Sweep
 from beaver_ftc.studies.engine.statistics import CONFIDENCE

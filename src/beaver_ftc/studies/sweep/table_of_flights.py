@@ -9,10 +9,9 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
-from beaver_ftc.documents.document import Document
+from beaver_ftc.documents.document import Document, plain
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.documents.validation import plain
-from beaver_ftc.results.log import units
+from beaver_ftc.results.units import units
 from beaver_ftc.scenario.airframe import checked_against
 from beaver_ftc.scenario.schema import ScenarioLike, load
 from beaver_ftc.scenario.sweeps import Sweep, validate_sweep

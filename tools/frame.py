@@ -21,10 +21,11 @@ import beaver_ftc
 from beaver_ftc import Simulation
 
 ROOT = Path(beaver_ftc.__file__).parent
-LOOP = (
-    "loop/accounts", "loop/frame", "loop/guarantee", "loop/inconclusive", "loop/log_row", "loop/stepping",
+PARTS = (
+    "control", "design", "diagnosis", "loop/accounts", "loop/frame", "loop/guarantee", "loop/inconclusive",
+    "loop/log_row", "loop/stepping",
 )  # fmt: skip
-KERNELS = tuple(str(ROOT / part) for part in ("control", "design", "diagnosis", *LOOP))
+KERNELS = tuple(str(ROOT / part) for part in PARTS)
 PLAIN = "NUMBA_DISABLE_JIT"
 MOST_FIELDS = 6  # of a kernel, printed
 

@@ -85,7 +85,7 @@ def _reasons(counted: np.void, aircraft: Aircraft, end_s: float) -> Iterator[Rea
     """Each reason that was one; share: still the number of frames."""
     spans = measured_spans(aircraft)
     if counted["undiagnosed"]:
-        yield {**_reason(SCHEME, int(counted["undiagnosed"]), None, None), "says": NO_DIAGNOSIS}
+        yield _reason(SCHEME, int(counted["undiagnosed"])) | {"says": NO_DIAGNOSIS}
     if counted["late"]:
         yield _reason(LATE, int(counted["late"]), spans[LATE], (spans[LATE][1], end_s))
     for i, name in enumerate(quantities(aircraft)):
@@ -94,10 +94,10 @@ def _reasons(counted: np.void, aircraft: Aircraft, end_s: float) -> Iterator[Rea
             flown = as_altitudes(flown) if name == ALTITUDE else flown
             yield _reason(name, int(counted["beyond"][i]), spans[name], flown)
     if counted["between"]:
-        yield _reason(BETWEEN, int(counted["between"]), None, None)
+        yield _reason(BETWEEN, int(counted["between"]))
 
 
-def _reason(quantity: str, frames: int, measured: Span | None, flown: Span | None) -> Reason:
+def _reason(quantity: str, frames: int, measured: Span | None = None, flown: Span | None = None) -> Reason:
     return {
         "quantity": quantity, "share": frames, "measured": measured, "flown": flown,
         "says": outside(quantity, measured),

@@ -16,9 +16,13 @@ COUNTERS = (0, 0xD1B54A32D192ED03, 0x8CB92BA72F3D8DD7, 0xA0761D6478BD642F, 0xE70
 
 
 def are_ever_monitored(scenario: Scenario) -> bool:
-    """Whether they are at some time of the flight."""
-    flown = (scenario, *(then for _, then in stages(scenario)))
-    return any(Declared.of(then).monitors_sensors for then in flown)
+    """Whether the sensor monitor runs at some time of the flight."""
+    return any(Declared.of(then).monitors_sensors for then in _flown(scenario))
+
+
+def _flown(scenario: Scenario) -> tuple[Scenario, ...]:
+    """The scenario as it is at first, and after each change in flight."""
+    return scenario, *(then for _, then in stages(scenario))
 
 
 def has_real_engine(scenario: Scenario) -> bool:
@@ -60,11 +64,12 @@ def configure_instruments(instruments: np.void, scenario: Scenario, dt: float) -
 
 def line_for(scenario: Scenario) -> int:
     """How many samples the delay lines of a flight keep: as many as most flights', or as any's."""
-    instant_s, flown = 1.0 / scenario.rate_hz / scenario.substeps, [scenario]
-    flown += [then for _, then in stages(scenario)]
-    delays = [[getattr(then.sensors, name).delay_s / instant_s for name in SENSORS] for then in flown]
-    needed = [sum(_samples(delay) for delay in of_it) for of_it in delays]
-    return USUAL_LINE if max(needed) <= USUAL_LINE else MOST_LINE
+    instant_s = 1.0 / scenario.rate_hz / scenario.substeps
+    needed = max(
+        sum(_samples(getattr(then.sensors, name).delay_s / instant_s) for name in SENSORS)
+        for then in _flown(scenario)
+    )
+    return USUAL_LINE if needed <= USUAL_LINE else MOST_LINE
 
 
 def _samples(delay: float) -> int:

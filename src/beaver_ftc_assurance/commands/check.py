@@ -44,11 +44,9 @@ def command(
         sentences = []
         reasons = [" ".join(f"{file}: cannot be checked: {error}".split())]
     document = {"holds": not reasons, "statements": sentences, "refused": reasons}
-    count = sum(not sentence.startswith("not certified") for sentence in sentences)
-    lines = (
-        [*sentences, f"{count} statements hold"]
-        if not reasons
-        else [*reasons, "the certificate does not hold"]
-    )
+    lines = [*reasons, "the certificate does not hold"]
+    if not reasons:
+        count = sum(not sentence.startswith("not certified") for sentence in sentences)
+        lines = [*sentences, f"{count} statements hold"]
     answer(format, document, lambda: "\n".join(lines))
     raise typer.Exit(int(bool(reasons)))

@@ -1,8 +1,7 @@
 """What commands of the marks printed, kept in the user's cache until a file changes that they can read."""
 
-import base64
-import json
 import os
+import pickle
 import re
 import time
 from collections.abc import Collection, Iterator
@@ -52,33 +51,27 @@ class Kept:
     def _file(self, line: str) -> Path | None:
         whole = self._code if line.startswith(READS_CODE) else self._pages
         state = whole if "python -m " in line else self._shown
-        return self._folder and self._folder / f"{sha256(f'{state} {line}'.encode()).hexdigest()[:24]}.json"
+        return self._folder and self._folder / f"{sha256(f'{state} {line}'.encode()).hexdigest()[:24]}.pickle"
 
     def get(self, line: str) -> Output | None:
         """What this command printed when everything that it can read was as it is now."""
         file = self._file(line)
-        try:
-            found = json.loads(file.read_text(encoding="utf-8")) if file else None
-        except (OSError, ValueError):
-            return None
-        if found is None:
+        if file is None or not file.exists():
             return None
         os.utime(file)
-        drawn = {name: base64.b64decode(content) for name, content in found["pictures"].items()}
-        return Output(found["text"], processor_s=found["processor_s"], pictures=drawn)
+        found: Output = pickle.loads(file.read_bytes())
+        return found
 
     def put(self, line: str, output: Output) -> None:
         """Keep what can be used; drop what nobody has asked for in a fortnight."""
         file = self._file(line)
         if file is None or output.fault:
             return
-        drawn = {name: base64.b64encode(content).decode() for name, content in output.pictures.items()}
-        document = {"text": output.text, "processor_s": output.processor_s, "pictures": drawn}
         file.parent.mkdir(parents=True, exist_ok=True)
-        for old in file.parent.glob("*.json"):
+        for old in file.parent.iterdir():
             if old.stat().st_mtime < time.time() - _UNUSED_S:
                 old.unlink(missing_ok=True)
-        write_whole(file, json.dumps(document).encode())
+        write_whole(file, pickle.dumps(output))
 
 
 def _digest(places: Collection[str], more: str) -> str:

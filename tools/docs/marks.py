@@ -47,15 +47,6 @@ class Origin:
     machine: bool = False
     at: tuple[str, ...] = ()
 
-    def __str__(self) -> str:
-        parts = [self.command]
-        parts += ["dear"] * self.dear
-        parts += [f"probe: {self.probe}"] * bool(self.probe)
-        parts += [f"needs {self.needs}"] * bool(self.needs)
-        parts += ["machine"] * self.machine
-        parts += [f"at {' '.join(self.at)}"] if self.at else []
-        return " | ".join(parts)
-
 
 @dataclass(frozen=True)
 class Printed:

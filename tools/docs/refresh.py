@@ -6,7 +6,7 @@ import os
 import re
 import subprocess
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from itertools import zip_longest
 from pathlib import Path
@@ -27,6 +27,7 @@ _CODE_OR_LINK = re.compile(
     r"(?P<code>^(?P<mark>`{3,}).*?^(?P=mark)`*$|(?P<ticks>`+)[^\n]*?(?P=ticks))|\]\((?!\w+:|[#/])",
     re.M | re.S,
 )
+_AT = re.compile(r"(?: \| at [^|]*)? -->$")  # at the end of a mark: when it was flown
 _ROW = re.compile(r"^\|.*\|$", re.MULTILINE)  # of a table
 _LONGEST = 90  # of what is quoted in a finding
 
@@ -152,14 +153,8 @@ class Refreshed:
             return
         digest = digest_of(probe.text) if probe else "-"
         if self.wanted.flies(origin):
-            at = (revision(), datetime.now(UTC).strftime("%Y-%m-%d"), digest)
-            old = self.page.text[slice(*made.mark)]
-            new = old.replace(str(origin), str(replace(origin, at=at)))
-            if new == old and origin.at != at:
-                self._wrong(
-                    made.line, "options of what is dear stand in another order: probe, needs, machine, at"
-                )
-            self._edits.append((*made.mark, new))
+            at = f" | at {revision()} {datetime.now(UTC):%Y-%m-%d} {digest} -->"
+            self._edits.append((*made.mark, _AT.sub(at, self.page.text[slice(*made.mark)])))
         elif missing(origin):
             self._say(made.line, f"{origin.command} is not checked: it needs {origin.needs}")
         elif not origin.at:

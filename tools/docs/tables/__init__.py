@@ -7,7 +7,6 @@ table that few readers need it saves as CSV in the same way, by `aside`.
 """
 
 import csv
-import io
 import os
 import pickle
 import re
@@ -17,11 +16,14 @@ from collections.abc import Callable, Iterable, Mapping
 from functools import wraps
 from importlib import import_module
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, TypeVar
 
 from filelock import FileLock
 
 from beaver_ftc.documents.errors import BadInput, suggestion
+from beaver_ftc.studies.engine.study import Study, run_study
+from beaver_ftc.studies.present.page import Table
 from beaver_ftc.studies.present.tables import markdown_table
 from tools.docs.commands import BIN, SHARED
 from tools.docs.values import Place, at, printed
@@ -73,13 +75,24 @@ def picture(name: str, says: str, content: Any, **how: Any) -> str:
     return f"![{says}]({path.as_posix()})"
 
 
+def studied(study: Study, workers: int = 1) -> tuple[dict[str, Any], dict[str, bytes]]:
+    """The document of a study, and the pictures that it draws, by name."""
+    with TemporaryDirectory() as out:
+        document = run_study(study, Path(out), workers)
+        return document, {path.name: path.read_bytes() for path in Path(out).rglob("*.png")}
+
+
 def table_of(rows: Iterable[Any], columns: Mapping[str, Column], none: str = "-") -> str:
-    """Rows of a study in Markdown. columns: of each head, where its cell stands in a row and in what form, as
-    in the mark of a number (`delay_s .2f`, `share *100 .0f`), or what makes the cell of the row. none: for
-    what is null.
+    """Rows of a study in Markdown."""
+    return markdown_table(*head_and_rows(rows, columns, none)[:2])
+
+
+def head_and_rows(rows: Iterable[Any], columns: Mapping[str, Column], none: str = "-") -> Table:
+    """Rows of a study. columns: of each head, where its cell stands in a row and in what form, as in the mark
+    of a number (`delay_s .2f`, `share *100 .0f`), or what makes the cell of the row. none: for what is null.
     """
     made = {head: column if callable(column) else _taken(column, none) for head, column in columns.items()}
-    return markdown_table(tuple(made), [[of(row) for of in made.values()] for row in rows])
+    return Table(tuple(made), [[of(row) for of in made.values()] for row in rows])
 
 
 def _taken(words: str, none: str) -> Callable[[Any], str]:
@@ -107,38 +120,16 @@ def shared(make: Callable[[], T]) -> Callable[[], T]:
     return kept
 
 
-def aside(name: str, title: str, text: str) -> str:
-    """Save a Markdown table as CSV beside the pages, and return the item of a list that links to it."""
+def aside(name: str, title: str, table: Table) -> str:
+    """Save a table as CSV beside the pages, and return the item of a list that links to it."""
     path = Path("images", "tables", f"{name}.csv")
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(as_csv(text), encoding="utf-8")
+    with path.open("w", encoding="utf-8", newline="") as file:
+        rows = ([_plain(cell) for cell in row] for row in (table.head, *table.rows))
+        csv.writer(file, lineterminator="\n").writerows(rows)
     return f"- [{title}]({path.as_posix()})"
 
 
-def moved(text: str, head: str, name: str, title: str) -> str:
-    """The text, with what stands from this head to the end of its table as CSV, and the link in its place.
-
-    The head is the beginning of a caption, or of the table itself.
-    """
-    before, head, rest = text.partition(head)
-    _, bar, table = f"{head}{rest}".partition("|")
-    table, _, after = table.partition("\n\n")
-    if not head or not bar:
-        raise BadInput(f"{name}: no table from {head!r} on")
-    return f"{before}{aside(name, title, f'|{table}')}\n\n{after}".strip()
-
-
-def as_csv(text: str) -> str:
-    """The rows of a Markdown table, without its marks of bold, code and links."""
-    written = io.StringIO()
-    rows = csv.writer(written, lineterminator="\n")
-    for number, line in enumerate(line for line in text.splitlines() if line.startswith("|")):
-        if number != 1:  # the rule below the head
-            cells = re.split(r"(?<!\\)\|", line)[1:-1]
-            rows.writerow(_plain(cell) for cell in cells)
-    return written.getvalue()
-
-
 def _plain(cell: str) -> str:
-    cell = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", cell.strip())
-    return cell.replace("**", "").replace("`", "").replace("\\|", "|")
+    """Without marks of bold, code and links."""
+    return re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", cell.strip()).replace("**", "").replace("`", "")

@@ -11,14 +11,19 @@ from benchmarks.any_aircraft import TWELVE, row_of
 from benchmarks.unknown_instant import Cell, Survey, cells_of, shares_of
 
 from beaver_ftc.plant.instrumented import names
+from beaver_ftc.studies.present.page import Table
 from beaver_ftc.studies.present.tables import markdown_table
 from beaver_ftc_aircraft.derive.derivation import derive
 from beaver_ftc_aircraft.derive.first_use import derive_if_needed
 from tools.docs.pages import ROOT
-from tools.docs.tables import beaver, moved
+from tools.docs.tables import aside, beaver
 
 DERIVED_TITLE = "Derived aircraft: error of the design model near trim, and smallest certain losses"
 EACH_TITLE = "The same for each aircraft, at 0.001 false alarms an hour"
+EACH = (  # of the probe
+    "*Table 4. Each aircraft at 0.001 false alarms an hour, the default: share of the losses that each test "
+    "finds within 1 s, %.*"
+)
 LONGEST_S = 600
 FLIGHTS, HOURS, SEED = 10, 0.2, 90417
 PROBE = "pa28"
@@ -33,19 +38,21 @@ DERIVED = (
     "aircraft", "airspeed, m/s", "error p, rad/s²", "error q, rad/s²", "error r, rad/s²",
     "aileron, %", "elevator, %", "rudder, %",
 )  # fmt: skip
-REFUSED = "*Table 6. Aircraft of the package that cannot be derived, and the reason.*"
+REFUSED = "*Table {}. Aircraft of the package that cannot be derived, and the reason.*"
 FLOWN = ("healthy", "false alarms", "losses", "detected", "named", "wrong", "left out", "certain", "late")
 
 
 def derived_aircraft() -> str:
     """All of them, and in words those that cannot be derived."""
-    text = _derived(names()).replace("*Table 6.", "*Table 4.", 1)  # the probe keeps its digest
-    return moved(text, "| aircraft |", "derived-aircraft", DERIVED_TITLE)
+    rows, refused = _derived(names())
+    shown = aside("derived-aircraft", DERIVED_TITLE, Table(DERIVED, rows))
+    return f"{shown}\n\n{REFUSED.format(4)}\n\n{refused}"
 
 
 def derived_aircraft_probe() -> str:
     """One of them, and one that cannot be."""
-    return _derived((PROBE, "ball"))
+    rows, refused = _derived((PROBE, "ball"))
+    return f"{markdown_table(DERIVED, rows)}\n\n{REFUSED.format(6)}\n\n{refused}"
 
 
 def any_aircraft() -> str:
@@ -60,15 +67,17 @@ def any_aircraft_probe() -> str:
 
 def unknown_instant() -> str:
     """The diagnosis beside Page's test."""
-    return moved(_beside(WATCHED, LOST, HEALTHY), "*Table 4.", "unknown-instant", EACH_TITLE)
+    together, each = _beside(WATCHED, LOST, HEALTHY)
+    return f"{together}\n\n{aside('unknown-instant', EACH_TITLE, each)}"
 
 
 def unknown_instant_probe() -> str:
     """A few flights of one."""
-    return _beside((PROBE,), 2, 12)
+    together, each = _beside((PROBE,), 2, 12)
+    return f"{together}\n\n{EACH}\n\n{markdown_table(each.head, each.rows)}"
 
 
-def _beside(chosen: Iterable[str], flights: int, healthy: int) -> str:
+def _beside(chosen: Iterable[str], flights: int, healthy: int) -> tuple[str, Table]:
     """All aircraft together at each rate of false alarms; then each of them at the default rate."""
     found: dict[str, list[Cell]] = {}
     for name in chosen:
@@ -85,12 +94,8 @@ def _beside(chosen: Iterable[str], flights: int, healthy: int) -> str:
         (name, *(share for cell in of_it for share in _shares([cell], -1)[1:3]))
         for name, of_it in found.items()
     ]
-    return (
-        "*Table 3. All aircraft together; columns as explained above.*\n\n"
-        f"{markdown_table(BESIDE, together)}\n\n"
-        "*Table 4. Each aircraft at 0.001 false alarms an hour, the default: share of the losses that each "
-        f"test finds within 1 s, %.*\n\n{markdown_table(head, each)}"
-    )
+    caption = "*Table 3. All aircraft together; columns as explained above.*"
+    return f"{caption}\n\n{markdown_table(BESIDE, together)}", Table(head, each)
 
 
 def _shares(cells: list[Cell], rate: int) -> list[str]:
@@ -107,8 +112,9 @@ def _flown(chosen: Iterable[str], flights: int, hours: float) -> str:
     return markdown_table(("aircraft", *FLOWN), rows)
 
 
-def _derived(chosen: Iterable[str]) -> str:
-    """A row of each; one process each: a model that brings JSBSim down, or never ends, costs a line."""
+def _derived(chosen: Iterable[str]) -> tuple[list[tuple[str, ...]], str]:
+    """A row of each, and a table of those refused; one process each: a model that brings JSBSim down, or
+    never ends, costs a line."""
     rows, refused = [], {}
     for name in chosen:
         document, why = _derive(name)
@@ -116,10 +122,8 @@ def _derived(chosen: Iterable[str]) -> str:
             refused.setdefault(why, []).append(f"`{name}`")
         else:
             rows.append(_row(name, document))
-    table = markdown_table(
-        ("aircraft", "reason"), [(", ".join(those), why) for why, those in refused.items()]
-    )
-    return f"{markdown_table(DERIVED, rows)}\n\n{REFUSED}\n\n{table}"
+    reasons = [(", ".join(those), why) for why, those in refused.items()]
+    return rows, markdown_table(("aircraft", "reason"), reasons)
 
 
 def _derive(name: str) -> tuple[dict | None, str]:

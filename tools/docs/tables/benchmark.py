@@ -13,8 +13,9 @@ from beaver_ftc.studies.compare.trial import LAW, SCHEME, STATISTICAL, Entry, en
 from beaver_ftc.studies.compare.tune import LEAST_GAIN
 from beaver_ftc.studies.engine.statistics import CONFIDENCE, poisson_bound, wilson
 from beaver_ftc.studies.engine.study import fly_all
+from beaver_ftc.studies.present.page import Table
 from beaver_ftc.studies.present.tables import estimate, markdown_table
-from tools.docs.tables import aside, table_of
+from tools.docs.tables import aside, head_and_rows
 
 TUNING = Path(__file__).parents[3] / "benchmarks" / "tuning.json"  # how the values in tuned.json were found
 Document = dict[str, Any]
@@ -85,7 +86,7 @@ def benchmark_gains() -> str:
         f"values for {kept}, no admissible values for {', '.join(none)}, and values that were not adopted "
         f"for {len(last) - kept - len(none)}. A second tuning found the values of {', '.join(drawn)}."
     )
-    table = table_of(found, GAINS)
+    table = head_and_rows(found, GAINS)
     return f"{aside('benchmark-gains', 'Gain of a second tuning', table)}\n\n{says}"
 
 
@@ -176,13 +177,13 @@ def _block(number: int, title: str, rows: Rows, key: str, cell: Callable[[Any], 
     rest = "" if len(found) == len(rows) else f" In the other sets no rival is better than `{ours}`."
     return "\n\n".join([
         _caption(number, f"{title}; {BOLD} `{ours}`"),
-        _cells(rows, key, cell, better),
+        markdown_table(*_cells(rows, key, cell, better)[:2]),
         f"Better than `{ours}` are: {'; '.join(found)}.{rest}" if found
         else f"In no set is a rival better than `{ours}`.",
     ])  # fmt: skip
 
 
-def _cells(rows: Rows, key: str, cell: Callable[[Any], str], bold: Document | None = None) -> str:
+def _cells(rows: Rows, key: str, cell: Callable[[Any], str], bold: Document | None = None) -> Table:
     """A row for each scheme or law, a column for each set. bold: of each set, who is."""
     head = [f"{name} ({next(iter(of.values()))['faults']})" for name, of in rows.items()]
     body = [
@@ -192,7 +193,7 @@ def _cells(rows: Rows, key: str, cell: Callable[[Any], str], bold: Document | No
         ]
         for name in next(iter(rows.values()))
     ]  # fmt: skip
-    return markdown_table(("", *head), body)
+    return Table(("", *head), body)
 
 
 def _limits(row: Document, key: str) -> tuple[Any, ...]:
@@ -216,14 +217,14 @@ def _less(ours: float | None, theirs: float | None, more: bool) -> bool:
     return theirs > ours if more else theirs < ours
 
 
-def _rates(sets: dict[str, list[Document]]) -> str:
+def _rates(sets: dict[str, list[Document]]) -> Table:
     """What the numbers of flights say of a rate."""
     counts = sorted({lines[0]["faults"] for lines in sets.values()})
     rows = [
         [str(n), *(estimate(vars(wilson(round(share * n), n)), _percent)[1] for share in SHARES)]
         for n in counts
     ]
-    return markdown_table(("faulted flights", *(f"measured {_percent(share)} %" for share in SHARES)), rows)
+    return Table(("faulted flights", *(f"measured {_percent(share)} %" for share in SHARES)), rows)
 
 
 def _alarms(number: int, rows: Rows) -> str:

@@ -19,8 +19,9 @@ from beaver_ftc.studies.compare.criteria import LawCost, effort, flights, fly_en
 from beaver_ftc.studies.compare.gain import geometric_mean, relative_gain
 from beaver_ftc.studies.compare.sets import CALIBRATION, DRAW
 from beaver_ftc.studies.compare.trial import LAW, SCHEME, Entry
+from beaver_ftc.studies.present.page import Table
 from beaver_ftc.studies.present.tables import markdown_table
-from tools.docs.tables import aside, table_of
+from tools.docs.tables import aside, head_and_rows
 
 Document = dict[str, Any]
 FILE = Path(__file__).parents[1] / "chosen.yaml"
@@ -48,21 +49,21 @@ def chosen_asides() -> str:
     beside = "C2: flights that chose them, beside those of the results"
     links = [
         aside("chosen-constants", "C1: constants that flights chose, with the command of each",
-              table_of(rows, CONSTANTS)),
-        aside("chosen-flights", beside, table_of(rows, FLIGHTS)),
+              head_and_rows(rows, CONSTANTS)),
+        aside("chosen-flights", beside, head_and_rows(rows, FLIGHTS)),
         aside("chosen-not", "C3: other constants of the diagnosis of logs, each with its origin", _others()),
     ]  # fmt: skip
     return f"{len(rows)} groups of constants were chosen by flights.\n\n" + "\n".join(links)
 
 
-def _others() -> str:
+def _others() -> Table:
     """The other constants of the diagnosis of logs, each with its value in the code and its origin."""
     rows = [
         (f"`{name}`", _value_text(file, name), *origin.partition(": ")[::2], Path(file).name)
         for file, origins in not_chosen_constants().items()
         for name, origin in origins.items()
     ]
-    return markdown_table(("constant", "value", "origin", "reason", "file"), rows)
+    return Table(("constant", "value", "origin", "reason", "file"), rows)
 
 
 def _value_text(file: str, name: str) -> str:

@@ -1,16 +1,14 @@
 """Tables of docs/explanation/fault-types.md."""
 
-from pathlib import Path
 from statistics import median
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import beaver_ftc as bf
-from beaver_ftc.studies.engine.study import run_study
 from beaver_ftc.studies.matrix.cells import informed_counts
 from beaver_ftc.studies.matrix.fault_matrix import cases, fly_case, matrix_study
 from beaver_ftc.studies.matrix.matrix_shown import SHOWN
 from beaver_ftc.studies.present.tables import markdown_table
+from tools.docs.tables import studied
 
 Document = dict[str, Any]
 EXAMPLE, AFTER_S = "elevator-stuck", 4.0  # of the candidates over time
@@ -75,8 +73,7 @@ def _closely(row: Document) -> str:
 
 def _matrix(declared: bool, turbulence: str = "none") -> str:
     """The table of verdicts by fault and surface, and a summary; in moving air the summary alone."""
-    with TemporaryDirectory() as folder:
-        document = run_study(matrix_study(declared=declared, turbulence=turbulence), Path(folder))
+    document, _ = studied(matrix_study(declared=declared, turbulence=turbulence))
     cells = {(cell["fault"], cell["surface"]): cell for cell in document["cells"]}
     surfaces = list(dict.fromkeys(surface for _, surface in cells))
     table = markdown_table(

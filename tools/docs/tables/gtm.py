@@ -10,7 +10,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
 
-from beaver_ftc.studies.present.tables import markdown_table
+from beaver_ftc.studies.present.page import Table
 from beaver_ftc_aircraft.gtm.steady import Bench, Condition, Steady
 from tools.docs.tables import aside, picture, shared
 from tools.gtm import flights
@@ -87,7 +87,7 @@ def gtm_flights() -> str:
         rows.append([name, *(f"{share:.2f}" for share in differ)])
     head = ("flight", "integrator 1 kHz, %", "integrator 200 Hz, %", "gravity, %")
     alt = "Airspeed and body rates of eight flights: specification and JSBSim at 1 kHz"
-    table = aside("gtm-flights", TITLES["flights"], markdown_table(head, rows))
+    table = aside("gtm-flights", TITLES["flights"], Table(head, rows))
     return f"{table}\n\n{picture('gtm-flights.png', alt, _drawn(), dpi=110)}"
 
 
@@ -135,7 +135,7 @@ def gtm_checks() -> str:
         ("frequency of the modes", f"{frequency:.1e}", "share"),
         ("damping of the modes", f"{damping:.1e}", "1"),
     ]
-    table = markdown_table(("quantity", "largest difference", "unit"), rows)
+    table = Table(("quantity", "largest difference", "unit"), rows)
     return aside("gtm-checks", TITLES["checks"], table)
 
 
@@ -223,7 +223,7 @@ def gtm_spiral() -> str:
     u, v, w = rows[:, :3].T
     size = np.sqrt(u * u + v * v + w * w)
     found = [size * 0.3048, *np.degrees([np.arctan2(w, u), np.arcsin(v / size), *rows[:, 3:8].T])]
-    table = markdown_table(
+    table = Table(
         ("quantity", "unit", "JSBSim", "published", "difference"),
         [
             (name, unit, f"{of.mean():.2f}", f"{given}", f"{of.mean() - given:.2f}")

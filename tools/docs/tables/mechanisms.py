@@ -1,17 +1,14 @@
 """What docs/results/mechanisms.md shows of the study of `beaver-ftc sensitivity --mechanisms`."""
 
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
-from beaver_ftc.studies.engine.study import run_into
 from beaver_ftc.studies.present.page import Table
 from beaver_ftc.studies.present.tables import markdown_table, number
 from beaver_ftc.studies.sensitivity import mechanisms_shown as shown
 from beaver_ftc.studies.sensitivity.command import mechanisms_study
 from beaver_ftc.studies.sensitivity.mechanisms import DRAWS, Flight, fly_one
 from beaver_ftc.studies.sensitivity.systems import DIAGNOSIS, LAW
-from tools.docs.tables import aside, picture, shared
+from tools.docs.tables import aside, picture, shared, studied
 
 Document = dict[str, Any]
 SEED = 1
@@ -33,17 +30,16 @@ _PICTURED = (
 
 
 @shared
-def _flown() -> tuple[Document, bytes]:
-    with TemporaryDirectory() as name:
-        document = run_into(mechanisms_study(DRAWS, SEED), Path(name), 2)
-        return document, Path(document["folder"], f"{shown.NAME}.png").read_bytes()
+def _flown() -> tuple[Document, dict[str, bytes]]:
+    return studied(mechanisms_study(DRAWS, SEED), 2)
 
 
 def mechanisms_findings() -> str:
     """What each mechanism is worth, in sentences; and the figure."""
     document, drawn = _flown()
     flown, *_, explained = shown.mechanism_sentences(document)
-    return f"{flown}\n\n{_grouped(document)}\n\n{explained}\n\n{picture('mechanisms.png', _PICTURED, drawn)}"
+    pictured = picture("mechanisms.png", _PICTURED, drawn[f"{shown.NAME}.png"])
+    return f"{flown}\n\n{_grouped(document)}\n\n{explained}\n\n{pictured}"
 
 
 def _grouped(document: Document) -> str:
@@ -63,7 +59,8 @@ def _signs(row: Document) -> tuple[bool, bool]:
 
 def mechanisms_systems() -> str:
     """Both systems with all of their mechanisms."""
-    return _markdown(shown.tables(_flown()[0])["systems"])
+    systems = shown.tables(_flown()[0])["systems"]
+    return markdown_table(systems.head, systems.rows)
 
 
 ASIDES = {
@@ -87,9 +84,7 @@ def mechanisms_asides() -> str:
     """Further tables, as CSV."""
     document = _flown()[0]
     tables = shown.tables(document) | {name: _by_level(document, *of) for name, of in LEVELS.items()}
-    return "\n".join(
-        aside(f"mechanisms-{name}", says, _markdown(tables[name])) for name, says in ASIDES.items()
-    )
+    return "\n".join(aside(f"mechanisms-{name}", says, tables[name]) for name, says in ASIDES.items())
 
 
 def _by_level(document: Document, factor: str, criterion: str, serves: str) -> Table:
@@ -102,10 +97,6 @@ def _by_level(document: Document, factor: str, criterion: str, serves: str) -> T
         if row["serves"] == serves
     ]
     return Table(("mechanism", *(head for name in names for head in (name, shown.INTERVAL))), rows)
-
-
-def _markdown(of: Table) -> str:
-    return markdown_table(of.head, of.rows)
 
 
 def mechanisms_probe() -> str:

@@ -10,6 +10,7 @@ from typing import Any
 
 from benchmarks import own_logs as own
 
+from beaver_ftc.studies.present.page import Table
 from beaver_ftc.studies.present.tables import markdown_table
 from beaver_ftc_logs.recorded.benchmark import LABEL_TITLES, SURFACE_KINDS, run_benchmark
 from beaver_ftc_logs.recorded.comparison import result_files
@@ -112,7 +113,7 @@ def own_logs_of_aircraft() -> str:
             [aircraft.removeprefix("jsbsim:"), AIR_TEXT[air], *row]
             for row in _own_rows(results, OWN_OF_AIRCRAFT)
         ]
-    table = markdown_table(("aircraft", "air", *OWN_OF_AIRCRAFT.values()), rows)
+    table = Table(("aircraft", "air", *OWN_OF_AIRCRAFT.values()), rows)
     return aside("own-logs-of-aircraft", "Simulated losses, other aircraft and still air", table)
 
 

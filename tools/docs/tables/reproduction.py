@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from beaver_ftc.studies.engine.study import fly_all
-from beaver_ftc.studies.present.page import Summary, write_files
+from beaver_ftc.studies.present.page import Summary, Table, write_files
 from beaver_ftc.studies.present.tables import markdown_table
 from beaver_ftc.studies.present.tables import number as plain_number
 from beaver_ftc.studies.reproduce import beside
@@ -84,7 +84,7 @@ def reproduction_not_everywhere() -> str:
     """The testable statements that hold as published, but not in every other setting: in how many, and where
     not."""
     document = _document()
-    table = markdown_table(("published", "statement", "settings", "not in"), [
+    table = Table(("published", "statement", "settings", "not in"), [
         (claim["where"], claim["statement"].rstrip("."), f"{claim['borne_out_in']} of {claim['elsewhere']}",
          "; ".join(_where_not(document, claim)))
         for claim in measured(document) if claim["verdict"] == BORNE_OUT and not claim["construction"]

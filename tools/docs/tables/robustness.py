@@ -3,8 +3,6 @@
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -18,8 +16,9 @@ from beaver_ftc.studies.detectability.probabilities import DUELS_S
 from beaver_ftc.studies.detectability.schemes import contenders
 from beaver_ftc.studies.detectability.schemes_shown import who_is_better
 from beaver_ftc.studies.engine.statistics import share_within, wilson
-from beaver_ftc.studies.engine.study import fly_all, run_into, run_study
+from beaver_ftc.studies.engine.study import fly_all
 from beaver_ftc.studies.matrix.informed import columns_of, informed_row
+from beaver_ftc.studies.present.page import Table
 from beaver_ftc.studies.present.tables import markdown_table, tabulated
 from beaver_ftc.studies.sensitivity.beyond import TOGETHER
 from beaver_ftc.studies.sensitivity.command import errors_study
@@ -27,7 +26,7 @@ from beaver_ftc.studies.sensitivity.errors_shown import COLUMNS
 from beaver_ftc.studies.sensitivity.errors_shown import error_sentences as sentences
 from beaver_ftc.studies.sweep.one_flight import fly_one, scenario_of
 from beaver_ftc.studies.sweep.sampling import Assignment, Plan
-from tools.docs.tables import moved, picture, table_of
+from tools.docs.tables import aside, picture, studied, table_of
 
 Document = dict[str, Any]
 Rows = list[dict[str, Any]]
@@ -185,9 +184,8 @@ def _with_fault(one: Assignment, part: str) -> Document:
 
 def robustness_power() -> str:
     """Share of losses found under tactical-grade sensors, by scheme, surface and air; and a picture of it."""
-    with TemporaryDirectory() as name:
-        document = run_study(schemes_study(GRIDS["quick"], contenders(None)), Path(name), 2)
-        picture("power-tactical-grade.png", "", Path(name, "detectability", "detectability.png").read_bytes())
+    document, drawn = studied(schemes_study(GRIDS["quick"], contenders(None)), 2)
+    picture("power-tactical-grade.png", "", drawn["detectability.png"])
     return _power_of(document)
 
 
@@ -195,8 +193,7 @@ def robustness_power_probe() -> str:
     """The same of a few flights, and each alarm level to more digits: it moves with the parameters of a
     scheme where shares of a few flights do not. That of multiple-models is 0 if no odds favour a fault."""
     grid = replace(GRIDS["quick"], blocks=1, magnitudes=(1.0,), excitations_deg_s=(3.0,), healthy_h=0.01)
-    with TemporaryDirectory() as name:
-        document = run_study(schemes_study(grid, contenders(None)), Path(name))
+    document, _ = studied(schemes_study(grid, contenders(None)))
     levels = (f"{each['turbulence']}, {each['scheme']}: {each['level']:.6g}" for each in document["levels"])
     return "\n".join((_power_of(document), *levels))
 
@@ -261,25 +258,22 @@ def _share(within: Any) -> float:
 
 def robustness_decay() -> str:
     """How verdicts decay beyond what is declared, of two scenarios; and a picture of the first."""
-    with TemporaryDirectory() as name:
-        studies = (errors_study(load_scenario(one)) for one in DECAYS)
-        whole, published = (run_into(study, Path(name), 2) for study in studies)
-        shown = picture("decay.png", _PICTURED, Path(whole["folder"], "sensitivity.png").read_bytes())
-    pictured = f"{shown}\n\n{DECAY_FIGURE}"
-    table = moved(_decay_table(whole), "*Table 1.", "robustness-decay", DECAY_TITLE)
-    return "\n\n".join([table, pictured, f"### {PUBLISHED}", _published(published)])
+    (whole, drawn), (published, _) = (studied(errors_study(load_scenario(one)), 2) for one in DECAYS)
+    shown = picture("decay.png", _PICTURED, drawn["sensitivity.png"])
+    table = aside("robustness-decay", DECAY_TITLE, _decay_table(whole))
+    return "\n\n".join([table, shown, DECAY_FIGURE, f"### {PUBLISHED}", _published(published)])
 
 
 def robustness_decay_probe() -> str:
     """Two flights of each row of the first."""
-    with TemporaryDirectory() as name:
-        document = run_study(errors_study(load_scenario(DECAYS[0]), 2), Path(name))
+    document, _ = studied(errors_study(load_scenario(DECAYS[0]), 2))
     says = "\n".join(f"- {sentence}" for sentence in sentences(document))
     flown = f"`{document['scenario']}`, {document['flights']} flights a row"
-    return f"{flown}:\n\n{says}\n\n{_decay_table(document)}"
+    table = _decay_table(document)
+    return f"{flown}:\n\n{says}\n\n{DECAY_CAPTION}\n\n{markdown_table(table.head, table.rows)}"
 
 
-def _decay_table(document: Document) -> str:
+def _decay_table(document: Document) -> Table:
     """A table without intervals, which the figure has."""
     shown = [
         row
@@ -295,7 +289,7 @@ def _decay_table(document: Document) -> str:
         )
         for line in lines
     ]
-    return f"{DECAY_CAPTION}\n\n{markdown_table(DECAY_HEAD, rows)}"
+    return Table(DECAY_HEAD, rows)
 
 
 def _published(document: Document) -> str:

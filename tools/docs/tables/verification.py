@@ -1,13 +1,11 @@
 """The table of docs/results/validation.md: how small a loss is certain to be found."""
 
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 from beaver_ftc.scenario.schema import load_scenario
 from beaver_ftc.studies.detectability.places import places_study
-from beaver_ftc.studies.engine.study import run_study
 from beaver_ftc.studies.present.tables import markdown_table
+from tools.docs.tables import studied
 
 
 def verification_map() -> str:
@@ -26,9 +24,7 @@ SCALES = (0.5, 2.0)  # of the references of `fault-free`
 
 def _surveyed(**where: Any) -> str:
     """The smallest losses that are found, by size of the references."""
-    with TemporaryDirectory() as folder:
-        study = places_study(load_scenario("fault-free"), excitations=SCALES, **where)
-        found = run_study(study, Path(folder))
+    found, _ = studied(places_study(load_scenario("fault-free"), excitations=SCALES, **where))
     rows = found["points"]
     head = (
         "loss of", "references times", "conditions",

@@ -24,6 +24,7 @@ from pathlib import Path
 import yaml
 
 from beaver_ftc.aircraft import Aircraft, Term, load
+from beaver_ftc.aircraft.aircraft import FORCES, MOMENTS
 from beaver_ftc.plant.instrumented import actuator_system
 
 SPAN_M, CABIN_M, JOINT, HINGE = 14.63, 1.22, 0.55, 0.25
@@ -102,15 +103,10 @@ def of_a_side(own: Term, arm: float) -> Iterator[tuple[str, float, str]]:
         yield "Cn", -own.value * arm, "yawing moment of its longitudinal force"
 
 
-def terms(whole: Aircraft, parts: Parts) -> list[Term]:
-    """The terms of all parts."""
-    return [t for surface, of_it in parts.items() for part in of_it for t in terms_of(whole, surface, part)]
-
-
-def model(whole: Aircraft, parts: Parts, name: str) -> str:
-    """The JSBSim model: that of the whole with its surfaces' terms and actuators replaced."""
+def model(whole: Aircraft, parts: Parts, made: Sequence[Term], name: str) -> str:
+    """The JSBSim model: that of the whole with its surfaces' terms and actuators replaced. made: the terms of
+    all parts."""
     text = whole.jsbsim.read_text(encoding="utf-8")
-    made = terms(whole, parts)
     for surface in parts:
         for term in (t for t in whole.terms.values() if t.surface == surface):
             pattern = rf'        <product name="aero/coefficient/{term.name}">.*?</product>\n'
@@ -119,12 +115,9 @@ def model(whole: Aircraft, parts: Parts, name: str) -> str:
         systems = "".join(f'  <system file="{part.name}"/>\n' for part in parts[surface])
         text = re.sub(rf'  <system file="{surface}"/>[^\n]*\n', systems, text)
     scales = "".join(f'    <property value="1"> uncertainty/{t.name}-scale </property>\n' for t in made)
-    text = text.replace(
-        '    <property value="0"> uncertainty/inertia-coupling/p',
-        scales + '    <property value="0"> uncertainty/inertia-coupling/p',
-        1,
-    )
-    for coefficient in ("CX", "CY", "CZ", "Cl", "Cm", "Cn"):
+    coupling = '    <property value="0"> uncertainty/inertia-coupling/p'
+    text = text.replace(coupling, scales + coupling, 1)
+    for coefficient in (*FORCES, *MOMENTS):
         products = "".join(_product(t) for t in made if t.coefficient == coefficient)
         start = text.index(f'<function name="aero/coefficient/{coefficient}">')
         at = text.index("      </sum>", start)
@@ -144,14 +137,10 @@ def _product(term: Term) -> str:
     )
 
 
-def data(
-    whole: Aircraft,
-    parts: Parts,
-    groups: Mapping[str, list[str]],
-    name: str,
-    says: str,
-) -> dict:
-    """What `aircraft.yaml` says."""
+def files(
+    whole: Aircraft, parts: Parts, groups: Mapping[str, list[str]], name: str, says: str
+) -> dict[str, str]:
+    """The files of the folder, by their names."""
     filed = yaml.safe_load((whole.folder / "aircraft.yaml").read_text(encoding="utf-8"))
     filed |= {"name": name, "description": says, "jsbsim": f"{name}.xml", "groups": dict(groups)}
     surfaces = {}
@@ -162,12 +151,17 @@ def data(
         if surface not in parts:
             surfaces[surface] = of
     filed["surfaces"] = surfaces
-    made = terms(whole, parts)
+    made = [t for surface, of_it in parts.items() for part in of_it for t in terms_of(whole, surface, part)]
     for section in ("moments", "forces"):
         for coefficient, given in filed[section].items():
             kept = [term for term in given if term.get("surface") not in parts]
             filed[section][coefficient] = kept + [_filed(t) for t in made if t.coefficient == coefficient]
-    return filed
+    filed = json.loads(json.dumps(filed))  # what is there twice is written twice
+    text = yaml.safe_dump(filed, sort_keys=False, default_flow_style=None, width=200)
+    written = {f"{name}.xml": model(whole, parts, made, name), "aircraft.yaml": FIRST_LINES + text}
+    for surface, of in filed["surfaces"].items():
+        written[f"Systems/{surface}.xml"] = actuator_system(surface, *of["travel_rad"])
+    return written
 
 
 _ENDS = {"command": "cmd-rad", "position": "pos-rad", "effective": "effective-rad"}
@@ -177,23 +171,6 @@ def _filed(term: Term) -> dict:
     value = float(f"{term.value:.10g}")
     keys = {"name": term.name, "value": value, "of": dict(term.of), "surface": term.surface}
     return keys | {"source": term.source, "description": term.description}
-
-
-def files(
-    whole: Aircraft,
-    parts: Parts,
-    groups: Mapping[str, list[str]],
-    name: str,
-    says: str,
-) -> dict[str, str]:
-    """The files of the folder, by their names."""
-    filed = data(whole, parts, groups, name, says)
-    filed = json.loads(json.dumps(filed))  # what is there twice is written twice
-    text = yaml.safe_dump(filed, sort_keys=False, default_flow_style=None, width=200)
-    made = {f"{name}.xml": model(whole, parts, name), "aircraft.yaml": FIRST_LINES + text}
-    for surface, of in filed["surfaces"].items():
-        made[f"Systems/{surface}.xml"] = actuator_system(surface, *of["travel_rad"])
-    return made
 
 
 def write(folder: Path, of_it: Mapping[str, str]) -> None:

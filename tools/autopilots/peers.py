@@ -96,19 +96,16 @@ class Px4:
     """PX4 in lockstep: each HIL_SENSOR sets its time, and it answers with HIL_ACTUATOR_CONTROLS of that time.
 
     silent: number of HIL_SENSOR messages at the start without an answer, while the autopilot starts;
-    armed_after: number of answers without the armed bit. texts, acks: other messages that came.
+    armed_after: number of answers without the armed bit. state, gps: the last messages of these kinds.
     """
 
     def __init__(self, pilot: Pilot, silent: int = 5, armed_after: int = 5) -> None:
         self._pilot, self._silent, self._armed_after = pilot, silent, armed_after
         self._mav = common.MAVLink(None, srcSystem=1, srcComponent=1)
         self._mav.robust_parsing = True
-        self._air: Any = None
         self.state: Any = None
         self.gps: Any = None
         self.stamps: list[int] = []
-        self.texts: list[str] = []
-        self.acks: list[tuple[int, int]] = []
 
     def hear(self, data: bytes) -> bytes:
         """The answer to these bytes."""
@@ -121,10 +118,6 @@ class Px4:
                 self.state = message
             elif kind == "HIL_GPS":
                 self.gps = message
-            elif kind == "STATUSTEXT":
-                self.texts.append(message.text)
-            elif kind == "COMMAND_ACK":
-                self.acks.append((message.command, message.result))
         return answer
 
     def _controls(self, sensor: Any) -> bytes:

@@ -5,7 +5,7 @@ Its inputs are the quantities that the protocols transmit. Its outputs are roll,
 and throttle from 0 to 1; a larger output rolls right, pitches up, yaws right or adds power.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from math import pi, radians, sin, tan
 
 G_MPS2 = 9.80665
@@ -42,10 +42,9 @@ def clipped(value: float, most: float) -> float:
 
 @dataclass
 class Small:
-    """Flies a circuit from its first position. legs: climb, bank and speed of each leg."""
+    """Flies a circuit from its first position."""
 
-    legs: tuple[tuple[float, float, float], ...] = CIRCUIT
-    _from: Told | None = field(default=None)
+    _from: Told | None = None
     _t_s: float = 0.0
 
     def _begin(self, told: Told) -> None:
@@ -60,7 +59,7 @@ class Small:
             self._begin(told)
         assert self._from is not None
         dt, self._t_s = told.t_s - self._t_s, told.t_s
-        climb, bank_deg, faster = self.legs[int((told.t_s - self._from.t_s) / LEG_S) % len(self.legs)]
+        climb, bank_deg, faster = CIRCUIT[int((told.t_s - self._from.t_s) / LEG_S) % len(CIRCUIT)]
         self._altitude_m += climb * dt
         power = self._to_speed(told, self._from.airspeed_mps + faster, climb, dt)
         return (
@@ -120,7 +119,7 @@ class Circuit(Small):
     top_m: float = 40.0
     turn_deg: float = 180.0
     phase: str = "roll"
-    _stood: Told | None = field(default=None)
+    _stood: Told | None = None
 
     def outputs(self, told: Told) -> tuple[float, float, float, float]:
         """The outputs, as of `Small`."""

@@ -41,13 +41,8 @@ class Spy:
         self._body, self._number_of = body, number_of
         self.flown: list[list[int]] = []
 
-    @property
-    def over(self) -> bool:
-        return self._body.over
-
-    @property
-    def packets_hz(self) -> float:
-        return self._body.packets_hz
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._body, name)
 
     def begin(self, packets_hz: float, channels: int = 16) -> None:
         self.flown.append([])
@@ -57,9 +52,6 @@ class Spy:
         if len(outputs):
             self.flown[-1].append(self._number_of(outputs))
         self._body.fly(outputs, frame_hz, in_charge)
-
-    def instant(self) -> Any:
-        return self._body.instant()
 
 
 @dataclass

@@ -2,7 +2,8 @@
 
 import csv
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable
+from itertools import takewhile
 from pathlib import Path
 
 from tools.docs.pages import chosen
@@ -35,25 +36,18 @@ def cells(text: str, folder: Path = Path()) -> dict[str, Rows]:
         caption = _CAPTION.match(line)
         number = caption[1] if caption else number
         if number and number not in found and _RULE.fullmatch(line.strip()):
-            names = [_name(head) for head in _row(lines[at - 1])]
-            found[number] = [
-                dict(zip(names, map(_value, row), strict=True)) for row in _rows(lines[at + 1 :])
-            ]
-    return found | {Path(name).stem: _beside(folder / name) for name in _FILE.findall(text)}
+            rows = takewhile(lambda line: line.startswith("|"), lines[at + 1 :])
+            found[number] = _records(map(_row, (lines[at - 1], *rows)))
+    for name in _FILE.findall(text):
+        found[Path(name).stem] = _records(csv.reader((folder / name).read_text("utf-8").splitlines()))
+    return found
 
 
-def _beside(path: Path) -> Rows:
-    with path.open(encoding="utf-8", newline="") as file:
-        head, *rows = csv.reader(file)
+def _records(rows: Iterable[list[str]]) -> Rows:
+    """Rows by the names of the columns, which the first one has."""
+    head, *others = rows
     names = [_name(one) for one in head]
-    return [dict(zip(names, map(_value, row), strict=True)) for row in rows]
-
-
-def _rows(lines: list[str]) -> Iterator[list[str]]:
-    for line in lines:
-        if not line.startswith("|"):
-            return
-        yield _row(line)
+    return [dict(zip(names, map(_value, row), strict=True)) for row in others]
 
 
 def _row(line: str) -> list[str]:

@@ -11,6 +11,8 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
+from tools.docs.pictures import in_few_colours
+
 FOLDER = Path(__file__).parents[2] / "docs" / "notebooks"
 COLOURS, WIDTH_PX = 64, 800
 TIMEOUT_S = 1800
@@ -29,16 +31,20 @@ def run(path: Path) -> Any:
     return notebook
 
 
+def outputs(notebook: Any) -> list[Any]:
+    """What its cells show."""
+    return [output for cell in notebook.cells for output in cell.get("outputs", [])]
+
+
 def texts(notebook: Any) -> list[str]:
     """What is shown in words, output by output."""
-    outputs = [output for cell in notebook.cells for output in cell.get("outputs", [])]
-    return [output.get("text") or output.get("data", {}).get("text/plain", "") for output in outputs]
+    shown = outputs(notebook)
+    return [output.get("text") or output.get("data", {}).get("text/plain", "") for output in shown]
 
 
 def pictures(notebook: Any) -> int:
     """How many pictures it shows."""
-    outputs = [output for cell in notebook.cells for output in cell.get("outputs", [])]
-    return sum("image/png" in output.get("data", {}) for output in outputs)
+    return sum("image/png" in output.get("data", {}) for output in outputs(notebook))
 
 
 def slim(notebook: Any) -> Any:
@@ -79,10 +85,7 @@ def _reduced(picture: str) -> str:
         image = image.resize(
             (WIDTH_PX, round(image.height * WIDTH_PX / image.width)), Image.Resampling.LANCZOS
         )
-    written = io.BytesIO()
-    colours = image.quantize(COLOURS, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
-    colours.save(written, "png", optimize=True)
-    return base64.b64encode(written.getvalue()).decode("ascii")
+    return base64.b64encode(in_few_colours(image, COLOURS)).decode("ascii")
 
 
 def main(names: list[str]) -> None:

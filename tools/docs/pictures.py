@@ -2,6 +2,7 @@
 
 import io
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -16,10 +17,19 @@ def lighten(picture: Path) -> Path:
     from PIL import Image
 
     with Image.open(picture) as image:
-        image.convert("RGB").quantize(256, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE).save(
-            picture, optimize=True
-        )
+        content = in_few_colours(image, 256)
+    picture.write_bytes(content)
     return picture
+
+
+def in_few_colours(image: Any, colours: int) -> bytes:
+    """A picture of PIL as PNG with a palette."""
+    from PIL import Image
+
+    written = io.BytesIO()
+    reduced = image.convert("RGB").quantize(colours, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
+    reduced.save(written, "png", optimize=True)
+    return written.getvalue()
 
 
 def write(path: Path, content: bytes) -> None:

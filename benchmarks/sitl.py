@@ -15,7 +15,7 @@ import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
@@ -40,9 +40,9 @@ def healthy(hours: float) -> Iterator[str]:
     seed, alarms, flown_s, lost, nearest, outside_s = 0, 0, 0.0, 0, 0.0, 0.0
     while flown_s < 3600 * hours:
         vehicle = Vehicle(base.with_({"seed": seed}), pulses=True, log=False)
-        end, autopilot = Ardupilot(vehicle, Link()), peers.Ardupilot(Small().outputs, RATE_HZ)
+        next_frame = connected(vehicle)
         while not vehicle.over:
-            autopilot.hear(end.take(autopilot.next(), "it", 0.0) or b"")
+            next_frame(0.0)
         document = vehicle.flight.land().metrics
         alarms += document["false_alarm"]
         lost += document["departure"] is not None
@@ -56,6 +56,12 @@ def healthy(hours: float) -> Iterator[str]:
     yield f"{said}, {outside_s:.0f} s outside the envelope, statistical test at most {nearest:.2f} of its bar"
     if alarms:
         raise SystemExit(1)
+
+
+def connected(vehicle: Vehicle) -> Callable[[float], object]:
+    """What flies the next frame of a vehicle at a time by the clock, s, under the small autopilot."""
+    end, autopilot = Ardupilot(vehicle, Link()), peers.Ardupilot(Small().outputs, RATE_HZ)
+    return lambda now_s: autopilot.hear(end.take(autopilot.next(), "it", now_s) or b"")
 
 
 def started(*arguments: str) -> tuple[subprocess.Popen, tuple[str, int]]:
@@ -77,11 +83,12 @@ def latency(frames: int) -> Iterator[str]:
     with tempfile.TemporaryDirectory() as out:
         file = Path(out) / "long.yaml"
         file.write_text("name: long\nduration_s: 36000\n", encoding="utf-8")
-        for protocol in ("ardupilot", "px4"):
+        ends = {"ardupilot": peers.Ardupilot(Small().outputs, 400), "px4": peers.Px4(Small().outputs)}
+        for protocol, end in ends.items():
             process, address = started(
                 str(file), "--as", protocol, "--rate", "400", "--speed", "0", "--out", out
             )
-            fly_on(protocol, address, frames)
+            end.fly(address, frames)
             process.send_signal(signal.SIGINT)
             link = json.loads(process.communicate()[0])["link"]
             yield f"{protocol}: {link['frames']} frames, answered within {link['latency_ms']} ms"
@@ -90,21 +97,12 @@ def latency(frames: int) -> Iterator[str]:
         raise SystemExit(1)
 
 
-def fly_on(protocol: str, address: tuple[str, int], frames: int) -> None:
-    """So many frames with a small autopilot."""
-    small = Small()
-    end = peers.Ardupilot(small.outputs, 400) if protocol == "ardupilot" else peers.Px4(small.outputs)
-    end.fly(address, frames)
-
-
 def memory(frames: int) -> Iterator[str]:
     """Resident memory while a flight goes on and on, log and all."""
     base = bf.load("fault-free").with_({"expect": {}, "duration_s": 36_000})
-    vehicle = Vehicle(base, pulses=True)
-    end, autopilot = Ardupilot(vehicle, Link()), peers.Ardupilot(Small().outputs, RATE_HZ)
-    seen = []
+    next_frame, seen = connected(Vehicle(base, pulses=True)), []
     for k in range(1, frames + 1):
-        autopilot.hear(end.take(autopilot.next(), "it", 0.001 * k) or b"")
+        next_frame(0.001 * k)
         if k % (frames // 10) == 0:
             seen.append(resident_mb())
             yield f"{k} frames: {seen[-1]:.1f} MB"

@@ -91,9 +91,9 @@ class Place:
         """What a command of beaver-ftc takes."""
         return self.taken([sys.executable, "-c", self.body, *words], cache)
 
-    def file(self, name: str, text: str) -> str:
-        """A file with this text."""
-        (self.folder / name).write_text(text, encoding="utf-8")
+    def without(self, name: str) -> str:
+        """The name of a folder, which is removed."""
+        shutil.rmtree(self.folder / name, ignore_errors=True)
         return name
 
 
@@ -128,20 +128,13 @@ def after_a_first_flight(place: Place, scenario: str) -> Taken:
     first = place.folder / "first-flight"
     if not first.exists():
         place.said("run", FAULT, "--no-report", cache=first.name)
-    shutil.rmtree(place.folder / "other", ignore_errors=True)
-    shutil.copytree(first, place.folder / "other")
+    shutil.copytree(first, place.folder / place.without("other"))
     return place.said("run", scenario, "--no-report", cache="other")
 
 
 def fresh_install(place: Place) -> Taken:
     """The first run ever."""
-    shutil.rmtree(place.folder / "empty", ignore_errors=True)
-    return place.said("run", FAULT, "--no-report", cache="empty")
-
-
-def derive(place: Place) -> Taken:
-    """An aircraft of JSBSim, into a folder."""
-    return place.said("derive", "jsbsim:c310", "--out", "derived")
+    return place.said("run", FAULT, "--no-report", cache=place.without("empty"))
 
 
 def import_gtm(place: Place) -> Taken | None:
@@ -153,8 +146,8 @@ def import_gtm(place: Place) -> Taken | None:
 def diagnose(place: Place) -> Taken:
     """A recorded flight of half an hour at 50 Hz, by the aircraft's own model."""
     if not (place.folder / "runs/half-hour").exists():
-        written = place.file("half-hour.yaml", HALF_HOUR)
-        place.said("run", written, "--no-report", "--as", "table")
+        (place.folder / "half-hour.yaml").write_text(HALF_HOUR, encoding="utf-8")
+        place.said("run", "half-hour.yaml", "--no-report", "--as", "table")
     return place.said("diagnose", "runs/half-hour/flight.csv", "--aircraft", "beaver")
 
 
@@ -186,9 +179,8 @@ def live(place: Place) -> Taken:
 
 def demo(place: Place) -> Taken:
     """A clone of the repository, and `make demo` in it, with an empty cache: needs the network."""
-    shutil.rmtree(place.folder / "clone", ignore_errors=True)
-    shutil.rmtree(place.folder / "empty", ignore_errors=True)
-    return place.taken(["sh", "-c", f"git clone -q {ROOT} clone && make -C clone demo"], "empty")
+    clone = f"git clone -q {ROOT} {place.without('clone')} && make -C clone demo"
+    return place.taken(["sh", "-c", clone], place.without("empty"))
 
 
 @dataclass(frozen=True)
@@ -214,11 +206,7 @@ def command(*words: str) -> Callable[[Place], Taken]:
 def study(*words: str) -> Callable[[Place], Taken]:
     """The wait for a study that begins anew: it would go on where an earlier one has ended."""
 
-    def measure(place: Place) -> Taken:
-        shutil.rmtree(place.folder / "study", ignore_errors=True)
-        return with_workers(lambda: place.said(*words, "--out", "study"))
-
-    return measure
+    return lambda place: with_workers(lambda: place.said(*words, "--out", place.without("study")))
 
 
 def another(scenario: str) -> Callable[[Place], Taken]:
@@ -234,7 +222,7 @@ WAITS = (
     Wait("run --no-report", 1.0, command("run", FAULT, "--no-report")),
     Wait("run", 2.0, command("run", FAULT)),
     Wait("live, until the page flies", 3.0, live),
-    Wait("derive a JSBSim aircraft", 4.0, derive),
+    Wait("derive a JSBSim aircraft", 4.0, command("derive", "jsbsim:c310", "--out", "derived")),
     Wait("import gtm", 8.0, import_gtm),
     Wait("diagnose, 30 min at 50 Hz", 5.0, diagnose),
     Wait("first run of a fresh install", 12.0, fresh_install, fresh=True),
@@ -263,24 +251,24 @@ def measured(wait: Wait, places: Sequence[Place], rounds: int) -> list[list[Take
     return found if all(found) else []
 
 
-def alone(wait: Wait, place: Place, rounds: int) -> str:
+def alone(wait: Wait, found: list[list[Taken]]) -> list[str]:
     """Wall, processor, memory and bar of a wait: medians, and the largest of the peaks."""
-    found = [taken for (taken,) in measured(wait, [place], 1 if wait.fresh else rounds)]
-    cells = ["-"] * 3
-    if found:
-        wall, processor, peaks = zip(*found, strict=True)
-        cells = [f"{statistics.median(of):.2f}" for of in (wall, processor)] + [f"{max(peaks):.0f}"]
-    cells.append("-" if wait.bar is None else f"{wait.bar:.2f}")
-    return f"{wait.name:34}" + "".join(f"{cell:>14}" for cell in cells)
+    bar = "-" if wait.bar is None else f"{wait.bar:.2f}"
+    if not found:
+        return ["-", "-", "-", bar]
+    wall, processor, peaks = zip(*(taken for (taken,) in found), strict=True)
+    return [f"{statistics.median(wall):.2f}", f"{statistics.median(processor):.2f}", f"{max(peaks):.0f}", bar]
 
 
-def in_pairs(wait: Wait, places: Sequence[Place], rounds: int) -> str:
+def in_pairs(wait: Wait, found: list[list[Taken]]) -> list[str]:
     """Then, now, and the median of their ratios, by the processor."""
-    found = measured(wait, places, 2 if wait.fresh else rounds)
-    pairs = [(then.processor, now.processor) for then, now in found]
-    columns = [*zip(*pairs, strict=True), [now / then for then, now in pairs]] if pairs else []
-    cells = [f"{statistics.median(of):.2f}" for of in columns] or ["-", "-"]
-    return f"{wait.name:34}" + "".join(f"{cell:>10}" for cell in cells)
+    rows = [(then.processor, now.processor, now.processor / then.processor) for then, now in found]
+    return [f"{statistics.median(of):.2f}" for of in zip(*rows, strict=True)]
+
+
+def printed(name: str, cells: Sequence[str]) -> None:
+    """A line of the table."""
+    print(f"{name:34}" + "".join(f"{cell:>14}" for cell in cells), flush=True)
 
 
 def main() -> int:
@@ -291,28 +279,21 @@ def main() -> int:
     parser.add_argument("--beside", metavar="REVISION", help="in pairs with the code of a revision")
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        now = Place(ROOT, Path(folder, "now"))
-        now.folder.mkdir()
+        places, cells = [Place(ROOT, Path(folder, "now"))], alone
         if given.beside:
-            from flight_cost import (
-                git,
-                unpack,
-            )  # not above: a process begins as large as the one it is forked from
+            import flight_cost  # not above: a process begins as large as the one it is forked from
 
-            then = Place(unpack(given.beside, Path(folder, "code")), Path(folder, "then"))
-            then.folder.mkdir()
-            said = git("rev-parse", "--short", given.beside).decode().strip()
-            print(f"{'processor, s':34}{said:>10}{'now':>10}{'now/then':>10}", flush=True)
+            tree = flight_cost.unpack(given.beside, Path(folder, "code"))
+            places, cells = [Place(tree, Path(folder, "then")), *places], in_pairs
+            printed("processor, s", (given.beside, "now", "now/then"))
         else:
-            print(f"{'':34}{'wall, s':>14}{'processor, s':>14}{'peak, MB':>14}{'bar, s':>14}", flush=True)
+            printed("", ("wall, s", "processor, s", "peak, MB", "bar, s"))
+        for place in places:
+            place.folder.mkdir()
         for wait in WAITS:
             if given.long or not wait.long:
-                row = (
-                    in_pairs(wait, (then, now), given.rounds)
-                    if given.beside
-                    else alone(wait, now, given.rounds)
-                )
-                print(row, flush=True)
+                rounds = len(places) if wait.fresh else given.rounds
+                printed(wait.name, cells(wait, measured(wait, places, rounds)))
     return 0
 
 

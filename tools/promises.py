@@ -26,17 +26,16 @@ def table() -> dict[str, Any]:
 
 
 @cache
-def at_night() -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """How the names of tests begin that are for the night, and of those among them that are not."""
-    night, day = (tuple(name for row in rows() for name in row.get(when, ())) for when in ("night", "day"))
-    return night, tuple(name for name in day if name.startswith(night))
-
-
-@cache
 def rows() -> list[dict[str, list[str]]]:
     """What tests/nightly.yaml says."""
     found: list[dict[str, list[str]]] = yaml.safe_load((TESTS / "nightly.yaml").read_text(encoding="utf-8"))
     return found
+
+
+@cache
+def listed(word: str) -> tuple[str, ...]:
+    """How the names of tests begin that nightly.yaml lists under a word."""
+    return tuple(name for row in rows() for name in row.get(word, ()))
 
 
 PARTS = {"thirds": 3, "tenths": 10}
@@ -45,7 +44,7 @@ PARTS = {"thirds": 3, "tenths": 10}
 @cache
 def thinned() -> dict[str, int]:
     """How the names of tests begin of whose cases `make test` runs one in so many."""
-    return {name: part for row in rows() for word, part in PARTS.items() for name in row.get(word, ())}
+    return {name: part for word, part in PARTS.items() for name in listed(word)}
 
 
 def is_spared(test: str) -> bool:
@@ -56,14 +55,18 @@ def is_spared(test: str) -> bool:
 
 def is_at_night(test: str) -> bool:
     """Whether `make nightly` alone runs a test."""
-    night, day = at_night()
-    return test.startswith(night) and not (day and test.startswith(day))
+    return test.startswith(listed("night")) and not test.startswith(_by_day_too())
 
 
 @cache
+def _by_day_too() -> tuple[str, ...]:
+    """How the names of tests begin that `make test` runs among those for the night."""
+    return tuple(name for name in listed("day") if name.startswith(listed("night")))
+
+
 def longest() -> tuple[str, ...]:
     """How the names of tests begin that `make acceptance` runs in place of `make test`."""
-    return tuple(name for row in rows() for name in row.get("acceptance", ()))
+    return listed("acceptance")
 
 
 def is_by_day(test: str) -> bool:

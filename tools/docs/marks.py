@@ -36,15 +36,13 @@ class Origin:
     """What prints something: a command, and if it is dear, what is known of the last time it did.
 
     probe: a cheap command whose output changes with that of the command. needs: the environment variable that
-    leads to data which the repository has not. machine: whether it is a time, of which another machine prints
-    another, so that nothing can be compared. at: revision, date, and digest of what the probe printed.
+    leads to data which the repository has not. at: revision, date, and digest of what the probe printed.
     """
 
     command: str
     dear: bool = False
     probe: str = ""
     needs: str = ""
-    machine: bool = False
     at: tuple[str, ...] = ()
 
 
@@ -176,8 +174,8 @@ def _origin(text: str, page: Page, line: int) -> Origin:
             found |= {str(option.lastgroup): option[str(option.lastgroup)]}
     if dear and not found.keys() - {"at"}:
         page.wrong(line, f"dear without a probe: {command}, allowed: | dear | probe: COMMAND")
-    machine, at = "machine" in found, tuple(found.get("at", "").split())
-    return Origin(command, bool(dear), found.get("probe", ""), found.get("needs", ""), machine, at)
+    at = tuple(found.get("at", "").split())
+    return Origin(command, bool(dear), found.get("probe", ""), found.get("needs", ""), at)
 
 
 def _match_numbers(page: Page) -> None:

@@ -50,7 +50,7 @@ class Envelope:
 
     def __init__(self, bench: Bench, case: int) -> None:
         taken = list(cases().values())[case - 1]["takes"] if case else ()
-        self.bench, self.case = bench, case
+        self.bench = bench
         self.known: dict[float, np.ndarray] = {}  # level flight by speed
         self.near: dict[tuple[float, float, float], np.ndarray] = {}  # all that was found
         self.no_rudder = all(name in taken for name in surfaces("rudder"))
@@ -63,7 +63,6 @@ class Envelope:
     ) -> Iterator[Turn]:  # fmt: skip
         """Yield every point of the grid, from the middle outwards, so that each has a neighbour to begin
         at."""
-        at = self._start(90.0)
         for speed in sorted(speeds, key=lambda v: abs(v - 90.0)):
             level = min(self.known, key=lambda of: abs(of - speed), default=None)
             at = self._start(speed) if level is None else self.known[level]

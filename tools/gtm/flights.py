@@ -22,7 +22,6 @@ from tools.gtm.specification import (
     Controls,
     Servos,
     Specification,
-    State,
     axes_of,
 )
 
@@ -81,10 +80,10 @@ def of_steady(steady: Steady) -> Controls:
     return of_commands(steady.elevator_deg, steady.aileron_deg, steady.rudder_deg, steady.throttle_percent)
 
 
-def state_of(steady: Steady, altitude_ft: float = 800.0) -> State:
-    """The state of a steady flight."""
+def state_of(steady: Steady) -> np.ndarray:
+    """The state of a steady flight, SIGNALS."""
     angles = radians(steady.phi_deg), radians(steady.theta_deg), radians(HEADING_DEG)
-    return State(*steady.velocity_fps, 0.0, 0.0, 0.0, *angles, altitude_ft)
+    return np.array([*steady.velocity_fps, 0.0, 0.0, 0.0, *angles, ALTITUDE_FT])
 
 
 def specified_trim(spec: Specification, wanted: Condition, guess: Steady) -> Steady:
@@ -102,7 +101,7 @@ def specified_trim(spec: Specification, wanted: Condition, guess: Steady) -> Ste
 
     def off(x: np.ndarray) -> np.ndarray:
         steady = made(x)
-        return spec.rates_of_change(state_of(steady, ALTITUDE_FT).array(), of_steady(steady), 0)[:6]
+        return spec.rates_of_change(state_of(steady), of_steady(steady), 0)[:6]
 
     first = guess.alpha_deg if wanted.alpha_deg is None else guess.airspeed_fps
     others = "phi_deg", "elevator_deg", "aileron_deg", "rudder_deg", "throttle_percent"
@@ -123,10 +122,11 @@ def _command(model: Bench, controls: Controls) -> None:
 
 @dataclass(frozen=True)
 class Manoeuvre:
-    """A manoeuvre: its first state, its commands over time, its duration, and the damage with its instant."""
+    """A manoeuvre: its first state, SIGNALS, its commands over time, its duration, and the damage with its
+    instant."""
 
     name: str
-    start: State
+    start: np.ndarray
     plan: Plan
     end_s: float
     case: int = 0
@@ -134,7 +134,7 @@ class Manoeuvre:
 
     def by_specification(self, spec: Specification) -> np.ndarray:
         """SIGNALS at every step of 5 ms, (n, 10), by the specification."""
-        servos, x, rows = Servos(spec.of, self.plan(0.0)), self.start.array(), []
+        servos, x, rows = Servos(spec.of, self.plan(0.0)), self.start, []
         for k in range(round(self.end_s / STEP_S) + 1):
             rows.append(x)
             t = k * STEP_S
@@ -143,13 +143,12 @@ class Manoeuvre:
 
     def by_jsbsim(self, model: Bench, dt: float = STEP_S, integrator: int = EULER) -> np.ndarray:
         """SIGNALS at the same times, by JSBSim. A frame reads the command of the time at which it ends."""
-        fdm, start = model.fdm, self.start
+        fdm, x = model.fdm, self.start
         fdm["simulation/integrator/rate/rotational"] = integrator
         fdm.set_dt(dt)
         model.damage(0)
         _command(model, self.plan(0.0))
-        angles = start.phi, start.theta, start.psi
-        model.place(start.altitude, (start.u, start.v, start.w), angles, (start.p, start.q, start.r))
+        model.place(x[9], x[:3], x[6:9], x[3:6])
         fdm.set_sim_time(0.0)
         every, rows = round(STEP_S / dt), []
         for k in range(round(self.end_s / dt) + 1):
@@ -211,19 +210,19 @@ def spin(spec: Specification) -> Manoeuvre:
     down = -rates / size  # a steady spin turns about the vertical, this one to the left
     alpha, beta = radians(SPIN["alpha"]), radians(SPIN["beta"])
 
-    def made(x: np.ndarray) -> tuple[State, Controls]:
+    def made(x: np.ndarray) -> tuple[np.ndarray, Controls]:
         V, elevator, aileron, rudder, tilt, turn = map(float, x)
         along = down + np.array([0.0, tilt / 100.0, turn / 100.0])
         along = along / np.linalg.norm(along)
         theta, phi = -np.arcsin(along[0]), atan2(along[1], along[2])
         p, q, r = -along * size
         u, v, w = V * cos(alpha) * cos(beta), V * sin(beta), V * sin(alpha) * cos(beta)
-        state = State(u, v, w, p, q, r, phi, theta, 0.0, 3000.0)
+        state = np.array([u, v, w, p, q, r, phi, theta, 0.0, 3000.0])
         return state, of_commands(elevator, aileron, rudder, 0.0)
 
     def off(x: np.ndarray) -> np.ndarray:
         state, controls = made(x)
-        return spec.rates_of_change(state.array(), controls, 0)[:6]
+        return spec.rates_of_change(state, controls, 0)[:6]
 
     tries = ((V, rudder) for V in (90.0, 110.0, 130.0) for rudder in (-20.0, 20.0))
     found = [root(off, [V, -15.0, 0.0, rudder, 0.0, 0.0]).x for V, rudder in tries]  # not each gets there
@@ -268,12 +267,12 @@ def linear_jsbsim(model: Bench, steady: Steady) -> np.ndarray:
         model.place(800.0, state[:3], angles, state[3:6])
         return model.accelerations()
 
-    return linear(of, state_of(steady).array()[:8])
+    return linear(of, state_of(steady)[:8])
 
 
 def linear_specified(spec: Specification, steady: Steady) -> np.ndarray:
     """The Jacobian of the specification."""
-    controls, whole = of_steady(steady), state_of(steady).array()
+    controls, whole = of_steady(steady), state_of(steady)
     return linear(lambda x: spec.rates_of_change(np.array([*x, *whole[8:]]), controls, 0)[:6], whole[:8])
 
 

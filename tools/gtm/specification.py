@@ -54,26 +54,6 @@ def multilinear(data: np.ndarray, axes: list[list[float]], at: list[float], hold
 
 
 @dataclass
-class State:
-    """The state: u, v, w in ft/s; p, q, r in rad/s; phi, theta, psi in rad; altitude in ft."""
-
-    u: float
-    v: float
-    w: float
-    p: float = 0.0
-    q: float = 0.0
-    r: float = 0.0
-    phi: float = 0.0
-    theta: float = 0.0
-    psi: float = 0.0
-    altitude: float = 800.0
-
-    def array(self) -> np.ndarray:
-        """The state as an array, in the order of the fields."""
-        return np.array(list(vars(self).values()))
-
-
-@dataclass
 class Controls:
     """Deflections of the surfaces, deg, and throttles that the engines follow, %."""
 
@@ -197,7 +177,8 @@ class Specification:
         return pressure, pressure / (self.of["constants"]["gas_constant"] * 518.67 * warm)
 
     def rates_of_change(self, x: np.ndarray, controls: Controls, case: int) -> np.ndarray:
-        """The derivative of a state, both as arrays."""
+        """The derivative of a state x (10,): u, v, w, ft/s; p, q, r, rad/s; phi, theta, psi, rad; altitude,
+        ft."""
         velocity, omega, (phi, theta, _), altitude = x[:3], x[3:6], x[6:9], x[9]
         V = float(np.linalg.norm(velocity))
         alpha, beta = atan2(velocity[2], velocity[0]), asin(velocity[1] / V)

@@ -191,7 +191,7 @@ def _of_sections(heading: str, part: str, key: Key, sections: Sections, shown: M
 def _of_values(part: str, key: Key, section: Section) -> Row:
     """The row of a key with a value. A key that ends with the unit of its instrument stands for those of
     all."""
-    units = list(dict.fromkeys(key.unit(place) for place in section.places)) if key.number else []
+    units = dict.fromkeys(key.unit(place) for place in section.places)
     says = _in_a_row(key.says)
     says = next((says.removesuffix(end) for unit in units if says.endswith(end := f", {unit or 1}")), says)
     if isinstance(key.example, Mapping) and key.example:
@@ -294,7 +294,7 @@ def _short(value: Any) -> Any:
         return {name: _short(one) for name, one in value.items()}
     if isinstance(value, list | tuple):
         return [_short(one) for one in value]
-    return int(value) if isinstance(value, float) and value.is_integer() and abs(value) <= 1e6 else value
+    return int(value) if isinstance(value, float) and value.is_integer() else value
 
 
 def _slug(heading: str) -> str:

@@ -1,8 +1,8 @@
 """What `sitl` promises of many frames, measured: latency, memory, false alarms in healthy hours.
 
-    python benchmarks/sitl.py latency [--frames 20000]
-    python benchmarks/sitl.py memory [--frames 1000000]
-    python benchmarks/sitl.py healthy [--hours 50]
+    python benchmarks/sitl.py latency
+    python benchmarks/sitl.py memory
+    python benchmarks/sitl.py healthy
 
 The autopilots are those of tools/autopilots: neither ArduPilot nor PX4 is needed. Exit status 1 where a bar
 is missed.
@@ -30,15 +30,16 @@ from beaver_ftc_links.sitl.vehicle import Vehicle
 
 MOST_LATENCY_MS, MOST_GROWTH_MB = 0.5, 2.0
 RATE_HZ = 100
+ANSWERED, FLOWN, HEALTHY_H = 20_000, 1_000_000, 50.0  # frames answered, frames of one flight, hours
 HEALTHY = "elevator-loss-in-turbulence"  # its air, sensors, servos, tolerances and what is declared of them
 
 
-def healthy(hours: float) -> Iterator[str]:
+def healthy() -> Iterator[str]:
     """Flights of an hour under the small autopilot in light turbulence, nothing broken: alarms, and how
     near."""
     base = bf.load(HEALTHY).with_({"faults": [], "expect": {}, "duration_s": 3600})
     seed, alarms, flown_s, lost, nearest, outside_s = 0, 0, 0.0, 0, 0.0, 0.0
-    while flown_s < 3600 * hours:
+    while flown_s < 3600 * HEALTHY_H:
         vehicle = Vehicle(base.with_({"seed": seed}), pulses=True, log=False)
         next_frame = connected(vehicle)
         while not vehicle.over:
@@ -77,7 +78,7 @@ def started(*arguments: str) -> tuple[subprocess.Popen, tuple[str, int]]:
     raise SystemExit(f"sitl has ended: {process.wait()}")
 
 
-def latency(frames: int) -> Iterator[str]:
+def latency() -> Iterator[str]:
     """From a packet to its answer, in another process, at 400 Hz and as fast as it goes."""
     late = False
     with tempfile.TemporaryDirectory() as out:
@@ -88,7 +89,7 @@ def latency(frames: int) -> Iterator[str]:
             process, address = started(
                 str(file), "--as", protocol, "--rate", "400", "--speed", "0", "--out", out
             )
-            end.fly(address, frames)
+            end.fly(address, ANSWERED)
             process.send_signal(signal.SIGINT)
             link = json.loads(process.communicate()[0])["link"]
             yield f"{protocol}: {link['frames']} frames, answered within {link['latency_ms']} ms"
@@ -97,13 +98,13 @@ def latency(frames: int) -> Iterator[str]:
         raise SystemExit(1)
 
 
-def memory(frames: int) -> Iterator[str]:
+def memory() -> Iterator[str]:
     """Resident memory while a flight goes on and on, log and all."""
     base = bf.load("fault-free").with_({"expect": {}, "duration_s": 36_000})
     next_frame, seen = connected(Vehicle(base, pulses=True)), []
-    for k in range(1, frames + 1):
+    for k in range(1, FLOWN + 1):
         next_frame(0.001 * k)
-        if k % (frames // 10) == 0:
+        if k % (FLOWN // 10) == 0:
             seen.append(resident_mb())
             yield f"{k} frames: {seen[-1]:.1f} MB"
     if seen[-1] - seen[0] > MOST_GROWTH_MB:
@@ -116,8 +117,7 @@ def resident_mb() -> float:
     return int(re.search(r"RssAnon:\s+(\d+)", text)[1]) / 1024
 
 
-# What is measured, and how much by itself: frames, hours.
-MEASURED = {"latency": (latency, 20_000), "memory": (memory, 1_000_000), "healthy": (healthy, 50.0)}
+MEASURED = {"latency": latency, "memory": memory, "healthy": healthy}
 
 
 def main() -> None:
@@ -126,11 +126,7 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("what", choices=MEASURED)
-    parser.add_argument("--frames", dest="amount", metavar="FRAMES", type=int)
-    parser.add_argument("--hours", dest="amount", metavar="HOURS", type=float)
-    given = parser.parse_args()
-    measure, usual = MEASURED[given.what]
-    for line in measure(given.amount or usual):
+    for line in MEASURED[parser.parse_args().what]():
         print(line, flush=True)
 
 

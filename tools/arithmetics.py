@@ -1,4 +1,4 @@
-"""Do other processors find what is kept? `python -m tools.arithmetics [--only NAME] [TEST]...`
+"""Do other processors find what is kept? `python -m tools.arithmetics [--only NAME]`
 
 Runs the tests that compare results of flights with kept ones once in each arithmetic that one machine can
 give, each in a child process: other instructions for compiled kernels, other functions of the C library,
@@ -29,7 +29,7 @@ ARITHMETICS = {
     "NumPy without x86-64-v3": {"NPY_DISABLE_CPU_FEATURES": "X86_V3"},
     "linear algebra of Nehalem": {"OPENBLAS_CORETYPE": "Nehalem"},
 }
-FLIGHTS = ("tests/loop/test_compiled_as_plain.py",)
+FLIGHTS = "tests/loop/test_compiled_as_plain.py"
 _HEAD = (
     "|arithmetic|tests passed|numbers that differ|largest, in tolerances|largest beside 0|other values|",
     "|---|---|---|---|---|---|",
@@ -55,12 +55,12 @@ def _write(row: list[Any]) -> None:
         print(json.dumps(row), file=file)
 
 
-def _flown(settings: dict[str, str], tests: list[str]) -> list[list[Any]]:
+def _flown(settings: dict[str, str]) -> list[list[Any]]:
     """What the tests compared under these settings of the environment, a row a value or a test."""
     with tempfile.TemporaryDirectory() as folder:
         to = Path(folder) / "rows"
         to.touch()
-        command = [sys.executable, "-m", "pytest", "-q", "-n", "0", "-p", "tools.arithmetics", *tests]
+        command = [sys.executable, "-m", "pytest", "-q", "-n", "0", "-p", "tools.arithmetics", FLIGHTS]
         environment = {**os.environ, **settings, _TO: str(to)}
         said = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, check=False)
         rows = [json.loads(line) for line in to.read_text().splitlines()]
@@ -98,13 +98,12 @@ def _wrong(rows: list[list[Any]]) -> Iterator[str]:
 def main() -> int:
     """Exit status 1 if a test fails in any arithmetic."""
     parser = argparse.ArgumentParser(prog="python -m tools.arithmetics", description=__doc__)
-    parser.add_argument("tests", nargs="*", default=FLIGHTS, metavar="TEST")
     parser.add_argument("--only", choices=ARITHMETICS, action="append", metavar="NAME")
     asked = parser.parse_args()
     print(*_HEAD, sep="\n")
     wrong: list[str] = []
     for name in asked.only or ARITHMETICS:
-        rows = _flown(ARITHMETICS[name], list(asked.tests))
+        rows = _flown(ARITHMETICS[name])
         print(_row(name, rows), flush=True)
         wrong += [f"{name}:", *found] if (found := list(_wrong(rows))) else []
     print(*wrong, sep="\n")

@@ -1,6 +1,6 @@
 """Print what runs in one frame of a flight: kernels in the order of their calls, and what each of them wrote.
 
-python -m tools.frame SCENARIO [--at SECONDS | --after-alarm FRAMES]
+python -m tools.frame SCENARIO [--after-alarm FRAMES]
 
 Kernels fly as plain Python, some 10 ms a frame. A field that is written with the value it had is not seen.
 """
@@ -80,13 +80,13 @@ class Trace:
                 self.open[-1][2].update(wrote)
 
 
-def trace(scenario: str, at_s: float | None, after_alarm: int) -> tuple[float, list[Call]]:
-    """Time of the frame, s, and its calls; frames are counted from the alarm on where no time is given."""
+def trace(scenario: str, after_alarm: int) -> tuple[float, list[Call]]:
+    """Time of the frame, s, and its calls; frames are counted from the alarm on."""
     flight = Simulation(scenario)
     record = flight._loop.frames  # that every kernel works on
-    while flight.t_s < at_s if at_s is not None else not flight.verdict.detected:
+    while not flight.verdict.detected:
         flight.step()
-    for _ in range(after_alarm - 1 if at_s is None else 0):
+    for _ in range(after_alarm - 1):
         flight.step()
     seen = Trace(record)
     sys.setprofile(seen)
@@ -124,14 +124,13 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("scenario")
-    parser.add_argument("--at", type=float, default=None, metavar="SECONDS", help="time of the frame")
     parser.add_argument("--after-alarm", type=int, default=1, metavar="FRAMES", help="frames after the alarm")
     given = parser.parse_args()
     if os.environ.get(PLAIN, "0") in ("", "0"):
         os.execve(
             sys.executable, [sys.executable, "-m", "tools.frame", *sys.argv[1:]], os.environ | {PLAIN: "1"}
         )
-    at_s, calls = trace(given.scenario, given.at, given.after_alarm)
+    at_s, calls = trace(given.scenario, given.after_alarm)
     print(f"{given.scenario}: {len(calls)} calls in the frame at {at_s:g} s")
     print(*lines(writers(calls)), sep="\n")
 

@@ -71,13 +71,12 @@ class Drawn:
 def drawn_flights(seed: int, aircraft: Sequence[str], kinds: Sequence[Kind] = KINDS) -> Iterator[Drawn]:
     """One covering array after the other, without end. Flight I of a seed is always the same."""
     schema, index, arrays = inlined(json_schema()), 0, 0
-    keys = tuple(keys_of(schema))
     while True:
         kind = kinds[arrays % len(kinds)]
         array = array_of(schema, aircraft, kind, np.random.default_rng([seed, arrays]))
         for row in array.rows():
             rng = np.random.default_rng([seed, arrays, index])
-            words = Composer(schema, keys, row, kind.declared, rng).words()
+            words = Composer(schema, row, kind.declared, rng).words()
             words |= {"name": f"drawn-{seed}-{index}", "seed": index}
             yield Drawn(index, row, words, kind.declared)
             index += 1
@@ -102,15 +101,7 @@ def _airframe(reference: str) -> Any:
 class Composer:
     """Makes the scenario of a row."""
 
-    def __init__(
-        self,
-        schema: Node,
-        keys: Sequence[tuple[str, Node]],
-        row: Row,
-        declared: bool,
-        rng: np.random.Generator,
-    ) -> None:
-        self._keys = keys
+    def __init__(self, schema: Node, row: Row, declared: bool, rng: np.random.Generator) -> None:
         self._schema, self._row, self._rng, self._declared = schema, row, rng, declared
         self._aircraft = _airframe(row["aircraft"])
         self._now = Circumstances(rng, self._aircraft, float(rng.uniform(SHORTEST_S, LONGEST_S)))
@@ -119,7 +110,7 @@ class Composer:
     def words(self) -> Words:
         """The scenario as the data of a file."""
         words: Words = {"aircraft": self._row["aircraft"], "duration_s": self._now.duration_s}
-        for path, node in self._keys:
+        for path, node in keys_of(self._schema):
             self._put_key(words, path, node)
         for part in (self._frame, self._air, self._diagnosis, self._changes, self._faults):
             part(words)
@@ -133,14 +124,12 @@ class Composer:
         level = self._row.get(path, LEFT_OUT)
         if level == LEFT_OUT or (path.startswith("initial.") and not self._is_of_aircraft(path)):
             return
-        try:
-            value = (
-                {"true": True, "false": False}.get(level, level)
-                if level != DRAWN
-                else self._walk.value(node, path)
-            )
-        except Undrawable:
-            return
+        value = {"true": True, "false": False}.get(level, level)
+        if level == DRAWN:
+            try:
+                value = self._walk.value(node, path)
+            except Undrawable:
+                return
         if path.endswith("actuators") and isinstance(value, dict):
             value = self._of_its_surfaces(value)
         put(words, path, value)
@@ -164,7 +153,7 @@ class Composer:
         """Write airspeed, rate and substeps."""
         rng, (low, high) = self._rng, self._aircraft.envelope.airspeed_mps
         third = (high - low) / 3.0
-        begin = low + {"slow": 0, "middle": 1, "fast": 2}[self._row["airspeed"]] * third
+        begin = low + ("slow", "middle", "fast").index(self._row["airspeed"]) * third
         put(words, "initial.airspeed_mps", float(rng.uniform(begin + 0.1 * third, begin + 0.9 * third)))
         words["rate_hz"] = float(round(log_uniform(rng, *RATES_HZ[self._row["rate"]])))
         many = self._row["substeps"] == "many"
@@ -203,9 +192,8 @@ class Composer:
             return
         node = self._schema["$defs"]["Change"]["properties"]
         keys = [key for key in node if key != "at_s"]
-        wanted = (
-            [[level]] if level != "several" else [list(self._rng.permutation(keys)[:2]) for _ in range(2)]
-        )
+        several = level == "several"
+        wanted = [list(self._rng.permutation(keys)[:2]) for _ in range(2)] if several else [[level]]
         made = [{key: self._changed(key, node[key]) for key in some} for some in wanted]
         times = sorted(self._walk.value(node["at_s"], "changes.at_s") for _ in made)
         words["changes"] = [{"at_s": at_s, **one} for at_s, one in zip(times, made, strict=True)]
@@ -239,24 +227,21 @@ class Composer:
     def _fault(self, kind: str, profile: str, surface: int) -> Words:
         """A fault with all keys of its type, sometimes without the position of a jam; the profile is that of
         the row."""
-        node = fault_types(self._schema)[kind]
-        keys = {
-            key: below
-            for key, below in node["properties"].items()
-            if key not in ("end_s", "profile", "kappa_per_s")
-        }
+        keys = fault_types(self._schema)[kind]["properties"]
+        left_out = {"end_s", "profile", "kappa_per_s"}
         if kind == "stuck" and self._rng.random() < 0.3:
-            del keys["position_deg"]
-        fault = {key: self._walk.value(below, f"faults.{kind}.{key}") for key, below in keys.items()}
+            left_out.add("position_deg")
+
+        def drawn(key: str) -> Any:
+            return self._walk.value(keys[key], f"faults.{kind}.{key}")
+
+        fault = {key: drawn(key) for key in keys if key not in left_out}
         if "actuator" in fault:
             fault["actuator"] = self._aircraft.surfaces[(surface - 1) % len(self._aircraft.surfaces)]
         if profile == "incipient":
-            kappa = self._walk.value(node["properties"]["kappa_per_s"], f"faults.{kind}.kappa_per_s")
-            fault |= {"profile": "incipient", "kappa_per_s": kappa}
+            fault |= {"profile": "incipient", "kappa_per_s": drawn("kappa_per_s")}
         if profile == "ended":
-            fault["end_s"] = max(
-                self._walk.value(node["properties"]["end_s"], f"faults.{kind}.end_s"), fault["at_s"] + 0.05
-            )
+            fault["end_s"] = max(drawn("end_s"), fault["at_s"] + 0.05)
         return fault
 
     def _sensor_fault(self, kind: str) -> Words:

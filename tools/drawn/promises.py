@@ -81,13 +81,8 @@ def _late(scenario: bf.Scenario, metrics: Document) -> Iterator[str]:
     """An alarm later than the instant from which it is certain. A broken instrument is an undeclared error,
     and makes nothing certain."""
     certain_s = metrics["detection"]["guaranteed_delay_s"]
-    if (
-        certain_s is None
-        or any(fault.sensor for fault in Truth.of(scenario).faults)
-        or metrics["false_alarm"]
-    ):
-        return
-    if scenario.fdi.scheme != OURS:
+    instrument = any(fault.sensor for fault in Truth.of(scenario).faults)
+    if certain_s is None or instrument or metrics["false_alarm"] or scenario.fdi.scheme != OURS:
         return
     delay_s = metrics["detection"]["delay_s"]
     if delay_s is None:

@@ -94,7 +94,7 @@ class Key:
         yield from (choice for choice in self.choices if choice != default and not self.sections)
         if any(form.get("type") == "boolean" for form in self.forms):
             yield not default
-        if self.number and default and not isinstance(default, list | dict):
+        if self.number and default:
             yield default
 
 
@@ -156,7 +156,7 @@ def _below(node: Node, path: Path) -> Iterator[tuple[Path, str, Node]]:
 
 
 def _branches(node: Node) -> list[Node]:
-    return [] if "properties" in node else [*node.get("anyOf", ()), *node.get("oneOf", ())]
+    return [*node.get("anyOf", ()), *node.get("oneOf", ())]
 
 
 def _inner(node: Node) -> Iterator[tuple[str, Node]]:

@@ -6,7 +6,7 @@ effect on the angular acceleration, and the noise. The effect is computed from t
 specification (tools/gtm: moments, mass, centre of gravity and inertia, with the damage minus without it) in
 every third frame, with straight lines between. The noise, which contains the errors of the model, is a vector
 autoregression that is fitted to flights without damage at that speed. The test is Page's
-(unknown_instant.py). A likelihood ratio that begins at one instant ever reaches h with a probability of at
+(page_test.py). A likelihood ratio that begins at one instant ever reaches h with a probability of at
 most exp(-h) [Ville]. With an instant in each frame, h = ln(frames per hour / alarms per hour) therefore gives
 at most the declared rate of false alarms. The level of a case is this h, or the largest value before the
 damage in any flight of the case, if that is larger.
@@ -31,7 +31,8 @@ from statistics import NormalDist
 
 import numpy as np
 from benchmarks.gtm_damage import M_S_PER_KT, SEEDS, Document, rows_in, scenario
-from benchmarks.unknown_instant import WITHIN_S, Whitener, fitted, largest_ratios, unexplained
+from benchmarks.page_test import Whitener, fitted, largest_ratios, unexplained
+from benchmarks.unknown_instant import WITHIN_S
 from tools.gtm.flights import CASES, NAMES
 from tools.gtm.specification import Controls, Specification, folder
 

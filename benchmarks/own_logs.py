@@ -31,7 +31,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
-from benchmarks.unknown_instant import Whitener, fitted
+from benchmarks.page_test import Whitener, fitted
 
 import beaver_ftc as bf
 from beaver_ftc.design.model import DesignFunctions, design_record

@@ -2,13 +2,8 @@
 
 `python -m tools.docs table unknown-instant` prints the comparison for aircraft of the jsbsim package.
 
-Page's test [Page1954] computes the log likelihood ratio of "this fault since this instant" for each instant,
-and takes the largest. If the observations have one distribution before the fault and one after it, no test
-has a shorter worst mean delay at the same mean time between false alarms. The test knows the surface, the
-magnitude, the design model and the noise. The noise is that of the true innovations: a vector autoregression
-of ORDER frames is fitted to the accelerations that the design model does not explain in healthy flights. It
-whitens the innovations and the signature of the fault. So it contains the errors of the model, the gusts and
-the noise of the gyros as they are, not as they are declared. Instants are 0.05 s apart and at most 10 s back.
+The test is Page's (page_test.py). It knows the surface, the magnitude, the design model and the noise.
+Instants are 0.05 s apart and at most 10 s back.
 
 The flights are those of `beaver-ftc detectability --grid`. The declaration equals the truth: sensors, air,
 and the error of the aircraft's own model at its measured rate of change. That error is known only within an
@@ -26,11 +21,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from math import log
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
+from benchmarks.page_test import Whitener, fitted, largest_ratios, unexplained
 
-from beaver_ftc.diagnosis.rivals.gust import VaneGust
 from beaver_ftc.scenario.airframe import find_aircraft
 from beaver_ftc.studies.compare.replay import Recording, Trace, record, trace
 from beaver_ftc.studies.detectability.grid import WATCHED_S, Block, Condition
@@ -38,8 +32,7 @@ from beaver_ftc.studies.detectability.levels import level_for
 from beaver_ftc.studies.detectability.schemes import BOTH, loss, scenario_of, strikes_at_s, with_fdi
 
 MAGNITUDES, EXCITATIONS_DEG_S = (0.4, 1.0), (3.0, 6.0)
-PER_H, EVERY, FURTHEST = 20.0, 5, 1000  # false alarms; frames between instants, and back
-ORDER, SETTLED, WITHIN_S = 20, 100, 1.0  # frames of the autoregression, and before it is fitted
+PER_H, EVERY, WITHIN_S = 20.0, 5, 1.0  # false alarms; frames between instants
 SHIPPED, SHIPPED_PER_H = 1.0, 1e-3  # our statistic's own alarm level, and the false alarms it declares
 RESAMPLED, PERCENT = 400, (2.5, 97.5)
 NONE = dict.fromkeys("pqr", 0.0)
@@ -49,78 +42,11 @@ OWN_ALONE = {
 }  # fmt: skip
 
 
-class Whitener(NamedTuple):
-    """A model of the noise. before (3 ORDER, 3): predicts a frame from those before it. root (3, 3): inverse
-    root of the covariance of the prediction error."""
-
-    before: np.ndarray
-    root: np.ndarray
-
-    def respond(self, z: np.ndarray) -> np.ndarray:
-        """The whitened accelerations z (n, 3) rad/s2: their noise is white, with variance one."""
-        return self.responses(z)[ORDER]
-
-    def responses(self, z: np.ndarray) -> np.ndarray:
-        """The same, (ORDER + 1, n, 3), of accelerations that are zero until j frames before each frame, j = 0
-        to ORDER; the last one begins at any earlier frame."""
-        rest = np.repeat(z[None], ORDER + 1, axis=0)
-        for j, part in enumerate(self.before.reshape(ORDER, 3, 3), start=1):
-            rest[j:, j:] -= z[:-j] @ part
-        return rest @ self.root
-
-
-def fitted(unexplained: list[np.ndarray]) -> Whitener:
-    """The noise model of healthy flights. unexplained: their accelerations, (n, 3) rad/s2 each."""
-    past = np.vstack([_past(z)[SETTLED:] for z in unexplained])
-    now = np.vstack([z[SETTLED:] for z in unexplained])
-    before = np.linalg.lstsq(past, now, rcond=None)[0]
-    rest = now - past @ before
-    return Whitener(before, np.linalg.inv(np.linalg.cholesky(rest.T @ rest / len(rest))).T)
-
-
-def _past(z: np.ndarray) -> np.ndarray:
-    """The ORDER frames before each, (n, 3 ORDER), the latest first."""
-    return np.hstack([np.vstack((np.zeros((j, 3)), z[:-j])) for j in range(1, ORDER + 1)])
-
-
-def unexplained(recording: Recording) -> np.ndarray:
-    """The acceleration of each frame that neither the design model nor the gust at the vanes explains,
-    (frames - 1, 3) rad/s2."""
-    gust = VaneGust(recording.context)
-    seen = [gust.subtracted(measured) for measured, _ in recording.seen]
-    x, expected = (
-        np.array([getattr(measured, of_it) for measured in seen]) for of_it in ("x", "acceleration")
-    )
-    return np.diff(x, axis=0) / recording.context.dt_s - expected[1:]
-
-
 def ratios(recording: Recording, surface: str, noise: Whitener) -> dict[float, np.ndarray]:
     """By magnitude: the largest log likelihood ratio at every frame, (n,)."""
     place = recording.context.surfaces.index(surface)
     does = -np.array([measured.contribution[:, place] for measured, _ in recording.seen[1:]])  # a total loss
     return largest_ratios(recording, does, noise, MAGNITUDES, EVERY)
-
-
-def largest_ratios(
-    recording: Recording, does: np.ndarray, noise: Whitener, sizes: tuple[float, ...] = (1.0,),
-    every: int = 1,
-) -> dict[float, np.ndarray]:  # fmt: skip
-    """By size: the same for a fault that adds accelerations does (n, 3) rad/s2 times this size, since
-    instants that are `every` frames apart."""
-    g, n = noise.respond(unexplained(recording)), len(does)
-    k, since = np.arange(n), np.arange(0, n, every)
-    response = noise.responses(does)
-    age = k[:, None] - since
-    began = np.clip(age, 0, ORDER), k[:, None]
-    late = (age >= 0) & (age < FURTHEST)
-    N, D = (
-        np.cumsum(np.where(age >= 0, seen.sum(axis=2)[began], 0.0), axis=0)
-        for seen in (response * g, np.square(response))
-    )
-    return {
-        m: np.concatenate(([0.0], np.where(late, m * N - 0.5 * m * m * D, 0.0).max(axis=1, initial=0.0)))
-        for m in sizes
-    }
 
 
 @dataclass(frozen=True)

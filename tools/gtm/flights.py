@@ -1,15 +1,15 @@
-"""Trim, linear modes, doublets, spin and damage, by JSBSim and by the specification, to compare both."""
+"""Trim, flights, coefficients and masses, by JSBSim and by the specification, to compare both."""
 
 import csv
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
-from math import atan2, cos, degrees, radians, sin
+from math import degrees, radians
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.optimize import fsolve, root
+from scipy.optimize import fsolve
 
 from beaver_ftc_aircraft.gtm.database import read
 from beaver_ftc_aircraft.gtm.folder import write_model
@@ -168,112 +168,6 @@ class Manoeuvre:
 
     def _case_at(self, t: float) -> int:
         return self.case if t >= self.onset_s - 1e-9 else 0
-
-
-def doublets(steady: Steady) -> Manoeuvre:
-    """Doublets of 2 deg: elevator at 1 s, rudder at 4 s, ailerons at 7 s, half a second to either side."""
-
-    def plan(t: float) -> Controls:
-        size = {at: 2.0 * ((at <= t < at + 0.5) - 1.0 * (at + 0.5 <= t < at + 1.0)) for at in (1.0, 4.0, 7.0)}
-        return of_commands(
-            steady.elevator_deg - size[1.0], steady.aileron_deg + size[7.0],
-            steady.rudder_deg + size[4.0], steady.throttle_percent,
-        )  # fmt: skip
-
-    return Manoeuvre("doublets", state_of(steady), plan, 15.0)
-
-
-# Case 2 departs: what is compared ends before two flights that differ by rounding differ by more.
-_ENDS_S = {2: 12.0}
-
-
-def damaged(steady: Steady, case: int) -> Manoeuvre:
-    """Damage at 10 s, in a turn that an aileron pulse at 6 s begins; the controls stay as they are."""
-
-    def plan(t: float) -> Controls:
-        pulse = -2.0 if 6.0 <= t < 6.8 else 0.0
-        aileron, throttle = steady.aileron_deg + pulse, steady.throttle_percent
-        return of_commands(steady.elevator_deg, aileron, steady.rudder_deg, throttle)
-
-    return Manoeuvre(CASES[case - 1], state_of(steady), plan, _ENDS_S.get(case, 15.0), case)
-
-
-# What the source's own figures have of a spin in equilibrium, deg and deg/s.
-SPIN = {"alpha": 23.2, "beta": 0.9, "p": -363.0, "q": 27.0, "r": -155.0}
-
-
-def spin(spec: Specification) -> Manoeuvre:
-    """A steady spin of the specification near the published one: its airspeed, attitude and controls make
-    all six accelerations zero."""
-    rates = np.array([SPIN[axis] for axis in "pqr"]) * np.pi / 180.0
-    size = float(np.linalg.norm(rates))
-    down = -rates / size  # a steady spin turns about the vertical, this one to the left
-    alpha, beta = radians(SPIN["alpha"]), radians(SPIN["beta"])
-
-    def made(x: np.ndarray) -> tuple[np.ndarray, Controls]:
-        V, elevator, aileron, rudder, tilt, turn = map(float, x)
-        along = down + np.array([0.0, tilt / 100.0, turn / 100.0])
-        along = along / np.linalg.norm(along)
-        theta, phi = -np.arcsin(along[0]), atan2(along[1], along[2])
-        p, q, r = -along * size
-        u, v, w = V * cos(alpha) * cos(beta), V * sin(beta), V * sin(alpha) * cos(beta)
-        state = np.array([u, v, w, p, q, r, phi, theta, 0.0, 3000.0])
-        return state, of_commands(elevator, aileron, rudder, 0.0)
-
-    def off(x: np.ndarray) -> np.ndarray:
-        state, controls = made(x)
-        return spec.rates_of_change(state, controls, 0)[:6]
-
-    tries = ((V, rudder) for V in (90.0, 110.0, 130.0) for rudder in (-20.0, 20.0))
-    found = [root(off, [V, -15.0, 0.0, rudder, 0.0, 0.0]).x for V, rudder in tries]  # not each gets there
-    state, controls = made(min(found, key=lambda x: float(np.abs(off(x)).max())))
-    return Manoeuvre("spin", state, lambda t: controls, 5.0)
-
-
-def linear(of: Callable[[np.ndarray], np.ndarray], x: np.ndarray) -> np.ndarray:
-    """Jacobian (8, 8) of u, v, w, p, q, r, phi, theta by differences. of: returns the six accelerations."""
-
-    def all_of(state: np.ndarray) -> np.ndarray:
-        p, q, r, phi, theta = state[3:8]
-        turn = q * sin(phi) + r * cos(phi)
-        return np.array([*of(state), p + turn * np.tan(theta), q * cos(phi) - r * sin(phi)])
-
-    steps = np.array([1e-3] * 3 + [1e-5] * 3 + [1e-6] * 2)
-    columns = [(all_of(x + h) - all_of(x - h)) / (2.0 * h.sum()) for h in np.diag(steps)]
-    return np.array(columns).T
-
-
-def modes(matrix: np.ndarray) -> dict[str, tuple[float, float]]:
-    """Frequency, rad/s, and damping of each oscillation of the longitudinal and of the lateral motion."""
-    longitudinal, lateral = [0, 2, 4, 7], [1, 3, 5, 6]
-    found: dict[str, tuple[float, float]] = {}
-    for kind, states in (("longitudinal", longitudinal), ("lateral", lateral)):
-        roots = np.linalg.eigvals(matrix[np.ix_(states, states)])
-        swings = sorted(
-            {(round(abs(z), 12), round(-z.real / abs(z), 12)) for z in roots if z.imag > 0}, reverse=True
-        )
-        names = ("short period", "phugoid") if kind == "longitudinal" else ("Dutch roll", "lateral phugoid")
-        found |= dict(zip(names, swings, strict=False))
-    return found
-
-
-def linear_jsbsim(model: Bench, steady: Steady) -> np.ndarray:
-    """The Jacobian of the converted model."""
-    for name, number in steady.commands().items():
-        model.fdm[name] = number
-
-    def of(state: np.ndarray) -> np.ndarray:
-        angles = state[6], state[7], radians(HEADING_DEG)
-        model.place(800.0, state[:3], angles, state[3:6])
-        return model.accelerations()
-
-    return linear(of, state_of(steady)[:8])
-
-
-def linear_specified(spec: Specification, steady: Steady) -> np.ndarray:
-    """The Jacobian of the specification."""
-    controls, whole = of_steady(steady), state_of(steady)
-    return linear(lambda x: spec.rates_of_change(np.array([*x, *whole[8:]]), controls, 0)[:6], whole[:8])
 
 
 def coefficients(

@@ -16,7 +16,8 @@ import scipy.optimize
 import scipy.stats
 
 from tools.mutants.making import Mutant
-from tools.mutants.reach import Reach, few_examples, reach
+from tools.mutants.measure import few_examples, reach
+from tools.mutants.reach import Reach
 from tools.mutants.scope import FLOWN, MODES, SOURCES, drawn, flown, left_out, stale
 from tools.mutants.trial import HANGS, KILLED, outcome
 

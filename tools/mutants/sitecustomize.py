@@ -1,4 +1,4 @@
-"""Counts lines in every Python process that a test starts, while reach.py measures what tests execute.
+"""Counts lines in every Python process that a test starts, while measure.py measures what tests execute.
 
 PYTHONPATH makes Python import this module first; the environment has the name of the test.
 """

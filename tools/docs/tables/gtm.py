@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from beaver_ftc.studies.present.page import Table
 from beaver_ftc_aircraft.gtm.steady import Bench, Condition, Steady
 from tools.docs.tables import aside, picture, shared
-from tools.gtm import flights
+from tools.gtm import flights, manoeuvres, modes
 from tools.gtm.flights import ADAMS_BASHFORTH, FINE_S, MOTION
 from tools.gtm.specification import SURFACES, Specification, axes_of
 
@@ -75,8 +75,8 @@ def _flown() -> dict[str, tuple[np.ndarray, ...]]:
 
 def _manoeuvre(k: int, heavy: bool) -> flights.Manoeuvre:
     if k == 0:
-        return flights.doublets(_steady(heavy))
-    return flights.spin(_specifications()[1]) if k == 1 else flights.damaged(_steady(heavy), k - 1)
+        return manoeuvres.doublets(_steady(heavy))
+    return manoeuvres.spin(_specifications()[1]) if k == 1 else manoeuvres.damaged(_steady(heavy), k - 1)
 
 
 def gtm_flights() -> str:
@@ -188,8 +188,8 @@ def _modes() -> tuple[float, float]:
     for alpha_deg in BETWEEN_DEG:
         here = _bench().steady(Condition(alpha_deg=alpha_deg))
         there = _specified(Condition(alpha_deg=alpha_deg), here)
-        found = flights.modes(flights.linear_jsbsim(_bench(), here))
-        wanted = flights.modes(flights.linear_specified(_specifications()[1], there))
+        found = modes.modes(modes.linear_jsbsim(_bench(), here))
+        wanted = modes.modes(modes.linear_specified(_specifications()[1], there))
         for name, (omega, zeta) in wanted.items():
             frequency = max(frequency, abs(found[name][0] / omega - 1.0))
             damping = max(damping, abs(found[name][1] - zeta))

@@ -1,4 +1,7 @@
-"""The keys of scenario, sweep, plan, aircraft and vehicle files: each as the schema has it that loads it."""
+"""The keys of scenario, sweep, plan, aircraft and vehicle files: each as the schema has it that loads it.
+
+keys.yaml has the pages (title, first words, kinds of files, next page) and links below headings of sections.
+"""
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -36,7 +39,6 @@ class Kind(NamedTuple):
 
     schema: Callable[[], Node]
     more: Callable[[], Iterator[str]] = lambda: iter(())
-    links: Mapping[str, str] = {}  # heading of a section -> link to the page that explains it
 
 
 class Row(NamedTuple):
@@ -61,7 +63,7 @@ def page(title: str, first: str, kinds: Iterable[str], after: str) -> str:
 
 def _kind(name: str, shown: dict[str, str]) -> Iterator[str]:
     """The example, a table for each key at the top of the file, and what else is to be said."""
-    kind, what = KINDS[name], name.removesuffix("-keys")
+    kind, what, links = KINDS[name], name.removesuffix("-keys"), _TEXTS["links"].get(name, {})
     example = (EXAMPLES / f"{name}.yaml").read_text(encoding="utf-8")
     yield f"## {what.capitalize()} file\n\n```yaml\n{example}```"
     sections = Sections(kind.schema())
@@ -77,8 +79,8 @@ def _kind(name: str, shown: dict[str, str]) -> Iterator[str]:
             alone = heading in dict(_NAMED.values()) or sum(not _part(one) for one in members) == 1
             yield f"## {heading}"
             yield from says if alone else ()
-            if heading in kind.links:
-                yield f"More: {kind.links[heading]}."
+            if link := links.get(heading.strip("`")):
+                yield f"More: {link}."
         yield _table(list(_rows(heading, members, sections, shown)))
     yield from kind.more()
 
@@ -337,64 +339,12 @@ def _preset(of: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
 
 
 _READ = "[How to read these tables](reference/README.md#tables-of-keys) explains the columns."
-_DERIVED = "explanation/derived-aircraft.md"
-_LINKS = {
-    "`autopilot`": "[outer loops](explanation/laws.md#outer-loops)",
-    "`faults[]`": "[fault types](explanation/fault-types.md), "
-    "[signs of the surfaces](results/validation.md#surfaces-and-signs)",
-    "`fdi`": "[declare errors](how-to/declare-errors.md), [detection](explanation/detection.md), "
-    "[isolation](explanation/isolation.md), [sensor monitor](explanation/instruments.md), "
-    "[statistical detector](explanation/statistical.md), "
-    "[active probing](explanation/fault-types.md#active-probing)",
-    "`control`": "[control laws](explanation/laws.md)",
-}
-_AIRCRAFT_LINKS = {
-    "`surfaces.NAME`": "[properties of the Beaver](reference/properties.md), "
-    "[signs](reference/glossary.md#axes-and-signs)",
-    "`moments`": "[terms of the Beaver](reference/properties.md#aerodynamic-terms), "
-    f"[fit of the terms]({_DERIVED}#3-fit)",
-    "`model_error_rad_s2`": f"[meaning of the bound]({_DERIVED}#what-the-bound-means)",
-    "`model_error_map`": f"[measurement of the error]({_DERIVED}#4-measure)",
-    "`effectors.NAME`": "[fly with the engines](how-to/engines.md)",
-    "`channels`": "[fly under an autopilot](how-to/autopilots.md)",
-    "`damage.NAME`": "[damage on the GTM](results/aircraft.md#damage-on-nasas-gtm)",
-}
 KINDS = {
-    "scenario-keys": Kind(json_schema, _of_scenarios, _LINKS),
+    "scenario-keys": Kind(json_schema, _of_scenarios),
     "sweep-keys": Kind(sweep_json_schema),
-    "plan-keys": Kind(
-        plan_json_schema,
-        links={"`requirements[]`": "[its tests](how-to/evidence.md#what-a-requirement-tests)"},
-    ),
-    "aircraft-keys": Kind(AircraftFile.model_json_schema, links=_AIRCRAFT_LINKS),
+    "plan-keys": Kind(plan_json_schema),
+    "aircraft-keys": Kind(AircraftFile.model_json_schema),
     "vehicle-keys": Kind(Vehicle.model_json_schema),
 }
-PAGES: dict[str, tuple[str, str, tuple[str, ...], str]] = {  # title, first words, kinds of files, next page
-    "scenario-keys": (
-        "Scenario keys",
-        "Which keys can a scenario file have? Only `name` is required. "
-        "[Scenarios](reference/scenarios.md) has examples of each section. `beaver-ftc schema` prints the "
-        "same keys as JSON Schema, with which an editor checks the file while you write it.",
-        ("scenario-keys",),
-        "[Sweep keys](reference/sweep-keys.md) has the keys of a file with many flights, and "
-        "[columns](reference/columns.md) lists the results of a flight.",
-    ),
-    "sweep-keys": (
-        "Sweep and plan keys",
-        "Which keys can a sweep file and a plan of evidence have? A [sweep](how-to/sweeps.md) flies one "
-        "scenario many times with varied values. A [plan](how-to/evidence.md) tests requirements. "
-        "`beaver-ftc schema --sweep` and `--plan` print the same keys as JSON Schema.",
-        ("sweep-keys", "plan-keys"),
-        "[Results of a sweep](how-to/sweeps.md#what-a-sweep-writes) has the files and statistics of a sweep.",
-    ),
-    "aircraft-keys": (
-        "Aircraft and vehicle keys",
-        "Which keys can an aircraft file and a vehicle file have? The file `aircraft.yaml` describes an "
-        "aircraft for the diagnosis and the laws; `derive` writes it "
-        "([your own aircraft](tutorials/own-aircraft.md)). A vehicle file states which column of a log "
-        "contains which quantity; `identify --check` proposes it ([prepare a log](how-to/flight-logs.md)).",
-        ("aircraft-keys", "vehicle-keys"),
-        "[Derived aircraft](explanation/derived-aircraft.md) explains how `derive` finds the terms. "
-        "[Diagnose a flight log](tutorials/flight-log.md) uses a vehicle file.",
-    ),
-}
+_TEXTS = yaml.safe_load(File(__file__).with_suffix(".yaml").read_text(encoding="utf-8"))
+PAGES: dict[str, tuple[Any, ...]] = {name: tuple(of.values()) for name, of in _TEXTS["pages"].items()}

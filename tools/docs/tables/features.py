@@ -1,13 +1,17 @@
-"""The table feature x aircraft of aircraft.md: what can be done with which aircraft, or why not."""
+"""The table feature x aircraft of aircraft.md: what can be done with which aircraft, or why not.
+
+features.yaml says how each feature is tried.
+"""
 
 import json
 import re
 import tempfile
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
+
+import yaml
 
 from beaver_ftc.documents.errors import BeaverFtcError
 from beaver_ftc.scenario.schema import load
@@ -25,44 +29,15 @@ PLANES = {
     "jsbsim:737": "jets",
     "jsbsim:SGS": "glider",
 }
+Document = dict[str, Any]
 LONGEST_S = 900
 LIVE = "`live`, changes in flight"
 YES, NO = "✓", "✗"
 STUDIES = ("sweep", "compare", "detectability")
 
 
-@dataclass(frozen=True)
-class Feature:
-    """How something is tried: keys of the scenario, and the command line that flies it as `S.yaml`."""
-
-    name: str
-    line: str = "run S.yaml --no-report"
-    keys: tuple[tuple[str, Any], ...] = ()
-
-
-_SENSED = (
-    ("sensors", "tactical-grade"), ("actuators", "servo"),
-    ("environment", {"turbulence": "dryden", "severity": "light"}),
-    ("fdi", {"bounds": {"sensors": "tactical-grade", "turbulence": "light"}, "statistical": {}}),
-)  # fmt: skip
-FEATURES = (
-    Feature("`run`, certificate", "run S.yaml --no-report --certificate"),
-    Feature("sensors, servos and turbulence, declared", keys=_SENSED),
-    Feature("hold altitude", keys=(("autopilot", {"altitude_m": [{"hold": True}]}),)),
-    Feature("hold airspeed and heading", keys=(
-        ("autopilot", {"airspeed_mps": [{"hold": True}], "heading_deg": [{"hold": True}]}),
-    )),
-    Feature("`sweep`", "sweep W.yaml"),
-    Feature("`compare --sweep`", "compare --sweep W.yaml --schemes observer-constant --laws nominal"),
-    Feature("`detectability`", "detectability S.yaml --surface elevator --airspeed {speed:.0f}"),
-    Feature("`detectability --grid`", "detectability --grid quick --aircraft {plane} --surface elevator "
-            "--sensors tactical-grade --turbulence none --schemes observer-constant"),
-    Feature("`separate`", "separate S.yaml", keys=(
-        ("faults", [{"actuator": "elevator", "type": "float", "at_s": 3}]), ("fdi", {"fault_class": "all"}),
-    )),
-    Feature("`linearise`", "linearise S.yaml"),
-    Feature("`mismatch`", "mismatch S.yaml --no-report"),
-)  # fmt: skip
+RUN = "run S.yaml --no-report"
+FEATURES = yaml.safe_load(Path(__file__).with_suffix(".yaml").read_text(encoding="utf-8"))
 
 
 def features() -> str:
@@ -72,13 +47,13 @@ def features() -> str:
 
 def features_probe() -> str:
     """On the aircraft that is built in, without the studies of several flights."""
-    quick = [feature for feature in FEATURES if feature.line.split()[0] not in STUDIES]
+    quick = {name: of for name, of in FEATURES.items() if not of.get("line", RUN).startswith(STUDIES)}
     return _table(("beaver",), quick, {LIVE: _live})
 
 
 def _table(
     planes: Iterable[str],
-    features: Sequence[Feature] = FEATURES,
+    features: Mapping[str, Document] = FEATURES,
     functions: Mapping[str, Callable[[str], str]] | None = None,
 ) -> str:
     """A row a feature and a function, a column a plane. functions: what is tried without a command, by name;
@@ -89,11 +64,11 @@ def _table(
         LIVE: _live,
     }
     reasons: list[str] = []
-    rows = [[feature.name] for feature in features] + [[name] for name in functions]
+    rows = [[name] for name in (*features, *functions)]
     for plane in planes:
         if plane.startswith("jsbsim:"):
             derive_if_needed(plane)
-        said = [_tried(feature, plane) for feature in features]
+        said = [_tried(of.get("line", RUN), of.get("keys", {}), plane) for of in features.values()]
         said += [tried(plane) for tried in functions.values()]
         for row, why in zip(rows, said, strict=True):
             if why and why not in reasons:
@@ -104,12 +79,12 @@ def _table(
     return markdown_table(("", *head), rows) + (f"\n\n{notes}" if notes else "")
 
 
-def _tried(feature: Feature, plane: str) -> str:
-    """Why it cannot be done; nothing if it can."""
+def _tried(line: str, keys: Document, plane: str) -> str:
+    """Why it cannot be done; nothing if it can. line: the command; keys: of the scenario."""
     speed_mps = load({"name": "S", "aircraft": plane}).initial.airspeed_mps
-    line = feature.line.format(plane=plane, speed=speed_mps)
+    line = line.format(plane=plane, speed=speed_mps)
     fault = {"actuator": "elevator", "type": "loss_of_effectiveness", "magnitude": 0.6, "at_s": 3}
-    flight = {"name": "S", "aircraft": plane, "duration_s": 6, "faults": [fault]} | dict(feature.keys)
+    flight = {"name": "S", "aircraft": plane, "duration_s": 6, "faults": [fault]} | keys
     with tempfile.TemporaryDirectory() as folder:
         (Path(folder) / "S.yaml").write_text(json.dumps(flight))
         (Path(folder) / "W.yaml").write_text(json.dumps({"name": "W", "base": "S.yaml", "runs": 2}))

@@ -25,7 +25,6 @@ from websockets.typing import Origin
 
 COMMAND = [sys.executable, "-c", "from beaver_ftc.cli.main import main; main()", "live"]
 TURNS, TURN_S = 4, 10.0  # without the guests and with them; of a turn
-BOTH = ("alone", "with them")
 
 
 class Watcher:
@@ -80,16 +79,13 @@ async def measure_class(guests: int) -> None:
         finally:
             process.terminate()
             process.wait()
-    print(f"{f'{guests} guests':36} {BOTH[0]:>10} {BOTH[1]:>10} {'ratio':>7}")
+    print(f"{f'{guests} guests':36} {'alone':>10} {'with them':>10} {'ratio':>7}")
     for what, unit in turns[0][1]:
-        together = statistics.median(pair[1][what, unit] for pair in turns)
-        alone = statistics.median(pair[0].get((what, unit), 0.0) for pair in turns)
-        beside = (
-            f"{alone:10.2f} {together:10.2f} {together / alone:7.2f}"
-            if alone
-            else f"{'':10} {together:10.2f} {'':7}"
+        alone, together = (
+            statistics.median(of.get((what, unit), 0.0) for of in turn) for turn in zip(*turns, strict=True)
         )
-        print(f"{what:36} {beside}  {unit}")
+        before, ratio = (f"{alone:.2f}", f"{together / alone:.2f}") if alone else ("", "")
+        print(f"{what:36} {before:>10} {together:10.2f} {ratio:>7}  {unit}")
     print(f"{'load of the machine':36} {os.getloadavg()[0]:10.1f}  on {os.cpu_count()} cores")
 
 

@@ -76,18 +76,12 @@ def _tables(text: str) -> Iterator[tuple[int, str]]:
     """Tables whose paragraph above is no caption."""
     lines = text.split("\n")
     for number, line in enumerate(lines):
-        if not _RULE.match(line.strip()) or number < 1:
-            continue
-        above = [row.strip() for row in lines[: number - 1]]
-        while above and not above[-1]:
-            above.pop()
-        begin = len(above)
-        while begin and above[begin - 1]:
-            begin -= 1
-        paragraph = " ".join(above[begin:])
-        if not re.match(r"\*Table \d+\. .*\*$", paragraph):
-            head = lines[number - 1].strip()
-            yield number, f"no caption above the table {head[:60]}, allowed: *Table N. Sentence.*"
+        if _RULE.match(line.strip()) and number:
+            above = "\n".join(lines[: number - 1]).rstrip()
+            paragraph = re.split(r"\n\s*\n", above)[-1].strip()
+            if not re.fullmatch(r"\*Table \d+\. .*\*", paragraph, re.DOTALL):
+                head = lines[number - 1].strip()
+                yield number, f"no caption above the table {head[:60]}, allowed: *Table N. Sentence.*"
 
 
 @cache

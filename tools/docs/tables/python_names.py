@@ -1,46 +1,20 @@
-"""The public Python names, in docs/reference/python.md: their order, and what each docstring says."""
+"""The public Python names, in docs/reference/python.md: those of python_names.yaml, with their docstrings."""
 
 import inspect
 import re
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
+import yaml
 from pydantic import BaseModel
 
 import beaver_ftc as bf
 from beaver_ftc.studies.present.tables import markdown_table
 
 RECORDS = "results.model"
-Names = Mapping[str, tuple[str, ...]]
-# Headings, the names below each as after `beaver_ftc.`, and the members that are shown where not all are.
-NAMES: dict[str, dict[str, tuple[str, ...]]] = {
-    "Scenarios and flights": {
-        "load": (), "scenarios": (), "Scenario": ("with_", "warnings"), "fly": (), "Flight": (),
-        "open_run": (), "results.flight.Proof": (),
-    },
-    "Records of a flight": {
-        f"{RECORDS}.{name}": ()
-        for name in (
-            "Fault", "Detection", "Statistical", "Inconclusive", "Isolation", "Named", "Withdrawn",
-            "Tracking", "Rates", "ModeChange", "Departure", "Expectation",
-        )
-    },
-    "Step by step": {
-        "Simulation": (), "results.simulation.Snapshot": (), "results.log.MemoryLog": (), "Diagnosis": (),
-    },
-    "Many flights": {"sweep": ()},
-    "Aircraft, trim and linear models": {
-        "aircraft.load": (), "aircraft.Aircraft": (), "trim": (), "plant.trim.TrimPoint": (), "linearise": (),
-        "plant.linear.LinearModel": (),
-    },
-    "Plug-ins": dict.fromkeys(
-        (
-            "Detector", "Law", "Measured", "Reference", "Verdict", "Context", "design.model.DesignFunctions",
-            "design.context.DeclaredErrors",
-        ), (),
-    ),
-    "Errors": {"BadInput": (), "SimulationFailed": ()},
-}  # fmt: skip
+Names = Mapping[str, list[str]]
+NAMES: dict[str, Names] = yaml.safe_load(Path(__file__).with_suffix(".yaml").read_text(encoding="utf-8"))
 SAYS = {
     "Records of a flight": "The attributes of a `Flight` are records, with the fields of `metrics.json`.",
     "Aircraft, trim and linear models": "`bf.aircraft(NAME)` calls `aircraft.load`. It also derives "
@@ -68,7 +42,7 @@ def directives() -> str:
     return "\n\n".join(parts)
 
 
-def _directive(name: str, members: tuple[str, ...]) -> str:
+def _directive(name: str, members: list[str]) -> str:
     options = [f"      members: [{', '.join(members)}]"] if members else []
     options += ["      inherited_members: false"] if name.startswith(RECORDS) else []
     return "\n".join([f"::: beaver_ftc.{name}", *(["    options:"] if options else []), *options])

@@ -12,17 +12,16 @@ import yaml
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.aircraft.schema import AircraftFile
-from beaver_ftc.plugins import DETECTORS, LAWS, options_of, registered
-from beaver_ftc.scenario import actuators, sensors
 from beaver_ftc.scenario.schema import json_schema
 from beaver_ftc.scenario.sweeps import sweep_json_schema
 from beaver_ftc.studies.present.tables import markdown_table
 from beaver_ftc_assurance.evidence.plan import plan_json_schema
 from beaver_ftc_logs.vehicle import Vehicle
-from tools.docs.reference.schema import ITEM, NAME, Key, Node, Path, Place, Section, Sections, dotted
+from tools.docs.reference.options import options_and_presets
+from tools.docs.reference.schema import ITEM, NAME, Key, Node, Path, Section, Sections, dotted
+from tools.docs.reference.value import default_of, in_a_line, size_of, value_of
 
 EXAMPLES = File(__file__).with_name("examples")  # a whole file of each kind
-_PARTS = ("p", "q", "r", ITEM, NAME)  # of a path: below the key that they are parts of
 _NAMED = {  # sections that stand in many places: heading, part
     "QuantityColumn": ("COLUMN", ""),
     "Level": ("LIMIT", "a rate"),
@@ -31,7 +30,6 @@ _NAMED = {  # sections that stand in many places: heading, part
 _SURFACES = load().surfaces
 _FEW = 6  # words of a key that shares its row
 _HEAD = ("in", "key", "meaning", "value", "default")
-_WORDS = {"string": "text", "boolean": "flag", "integer": "whole number", "number": "number"}
 
 
 class Kind(NamedTuple):
@@ -181,13 +179,13 @@ def _of_sections(heading: str, part: str, key: Key, sections: Sections, shown: M
     if not heading and where.startswith(f"`{key.name}") and len(key.sections) == 1:  # its heading says it
         says = _in_a_row(says)
         says = says[says.index("Left out:") :] if "Left out:" in says else ""
-    value = [*(f"`{word}`" for word in key.choices), _size(key)]
+    value = [*(f"`{word}`" for word in key.choices), size_of(key)]
     if where != heading and (heading or where in dict(_NAMED.values())):
         value.append(f"[{where}](#{_slug(where)})")
     if unit := _unit_of_keys(first):
         value.append(f"UNIT `{unit}`, LIMIT {_limit(first)}")
     name = f"`{key.name}`" if heading else f"[`{key.name}`](#{_slug(where)})"
-    return Row(part, name, _in_a_row(says), ", ".join(filter(None, value)), _default(key))
+    return Row(part, name, _in_a_row(says), ", ".join(filter(None, value)), default_of(key))
 
 
 def _of_values(part: str, key: Key, section: Section) -> Row:
@@ -199,11 +197,11 @@ def _of_values(part: str, key: Key, section: Section) -> Row:
     if isinstance(key.example, Mapping) and key.example:
         also = "".join(f", {name}: {in_a_line(value)}" for name, value in key.needs.items())
         says += f". *Example:* `{key.name}: {in_a_line(key.example)}{also}`"
-    name, value = key.name, _value(key, section.places)
+    name, value = key.name, value_of(key, section.places)
     if (unit := _unit_of_keys(section)) and name.endswith(f"_{unit}"):
         name = f"{name.removesuffix(unit)}UNIT"
         value = f"{value.replace(_limit(section), 'LIMIT').rpartition(' ')[0]} UNIT"
-    return Row(part, f"`{name}`", says, value, _default(key))
+    return Row(part, f"`{name}`", says, value, default_of(key))
 
 
 def _unit_of_keys(section: Section) -> str:
@@ -220,127 +218,13 @@ def _in_a_row(says: str) -> str:
     return " ".join(says.split()).replace("; left out: ", ". Left out: ").removesuffix(".")
 
 
-def _value(key: Key, places: list[Place]) -> str:
-    """What may stand there: kind of value, range, unit."""
-    if key.choices:
-        return ", ".join(f"`{in_a_line(choice)}`" for choice in dict.fromkeys(key.choices))
-    kinds = " or ".join(dict.fromkeys(map(_kind_of_value, key.forms)))
-    unit = _unit(key, places) if key.number else ""
-    in_words = key.range[-1:].isalpha() or unit.startswith(("as ", "the "))
-    limit = (", " if in_words else " ").join(filter(None, (key.range, unit)))
-    if kinds == "number" and limit:
-        return limit
-    return ", ".join(filter(None, (kinds, limit, _size(key)))).replace("text, ≤", "text ≤")
-
-
-def _kind_of_value(form: Node) -> str:
-    if form.get("type") == "array" and "prefixItems" in form:
-        return f"list of {len(form['prefixItems'])}"
-    for kind, inside, words in (
-        ("array", "items", "list of"),
-        ("object", "additionalProperties", "mapping to"),
-    ):
-        if form.get("type") == kind:
-            of = form.get(inside)
-            forms = of["anyOf"] if isinstance(of, Mapping) and of else ({},)
-            return f"{words} " + " or ".join(dict.fromkeys(map(_kind_of_value, forms)))
-    return _WORDS.get(form.get("type", ""), "value")
-
-
-def _unit(key: Key, places: list[Place]) -> str:
-    """The unit of a key; of several, each with the names of what has it, the commonest one last."""
-    names: dict[str, dict[str, None]] = {}
-    for place in places:
-        of = next((part for part in reversed(place.path) if part not in _PARTS), "")
-        names.setdefault(key.unit(place) or "1", {})[of] = None
-    usual = max(names, key=lambda unit: len(names[unit]))
-    others = [f"{unit} for {_quoted(of)}" for unit, of in names.items() if unit != usual]
-    if usual in ("1", "share of 1"):
-        return ", ".join(others)
-    return ", ".join([*others, f"otherwise {usual}"]) if others else usual
-
-
-def _quoted(names: Iterable[str]) -> str:
-    return " and ".join(f"`{name}`" for name in names)
-
-
-def _size(key: Key) -> str:
-    """How long a text, a list or a mapping may be."""
-    for form in key.forms:
-        if "maxLength" in form:
-            return f"≤ {form['maxLength']}"
-        of = "Items" if form.get("type") == "array" else "Properties"
-        if f"max{of}" in form and "prefixItems" not in form:
-            least = form.get(f"min{of}")
-            return f"{f'{least} to ' if least else '≤ '}{form[f'max{of}']} entries"
-    return ""
-
-
-def _default(key: Key) -> str:
-    if key.required:
-        return "required"
-    default = key.node.get("default")
-    flat = not isinstance(default, Mapping) or not any(isinstance(one, Mapping) for one in default.values())
-    return f"`{in_a_line(default)}`" if default not in (None, "", [], {}) and flat else ""
-
-
-def in_a_line(value: Any) -> str:
-    """A value as one line of YAML."""
-    text = yaml.safe_dump(_short(value), default_flow_style=True, width=10_000, sort_keys=False)
-    return text.removesuffix("\n").removesuffix("\n...")
-
-
-def _short(value: Any) -> Any:
-    """30 for 30.0."""
-    if isinstance(value, Mapping):
-        return {name: _short(one) for name, one in value.items()}
-    if isinstance(value, list | tuple):
-        return [_short(one) for one in value]
-    return int(value) if isinstance(value, float) and value.is_integer() else value
-
-
 def _slug(heading: str) -> str:
     return re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-")
 
 
-def _of_scenarios() -> Iterator[str]:
-    """What a scenario may name: schemes and laws with their options, presets."""
-    for group, what, where in ((DETECTORS, "scheme", "fdi"), (LAWS, "law", "control")):
-        yield f"## {what.capitalize()}s, and their `{where}.options`"
-        entries = [entry for entry in registered(group).values() if entry.package == "beaver-ftc"]
-        yield markdown_table((what, "meaning"), [(f"`{one.name}`", one.description()) for one in entries])
-        rows = [
-            (f"`{one.name}`", f"`{name}`", of["says"], _option_range(of), f"`{of['default']:g}`")
-            for one in entries
-            for name, of in options_of(group, one.name).items()
-        ]
-        yield markdown_table((what, "option", "meaning", "value", "default"), rows)
-    for what, presets in (("sensors", sensors.PRESETS), ("actuators", actuators.PRESETS)):
-        yield f"## Presets of `{what}`"
-        rows = [(f"`{name}`", *each) for name, of in presets.items() for each in _preset(of)]
-        yield markdown_table(("preset", what, "values"), rows)
-
-
-def _option_range(of: Mapping[str, Any]) -> str:
-    kind = "whole number, " if of.get("whole") else ""
-    return f"{kind}{of.get('low', 0):g} to {of['high']:g}"
-
-
-def _preset(of: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    """(instruments or surfaces, their values) of a preset."""
-    if not all(isinstance(values, Mapping) for values in of.values()):
-        of = {"all": of}
-    alike: dict[str, list[str]] = {}
-    for name, values in of.items():
-        alike.setdefault(f"`{in_a_line(values)}`", []).append(f"`{name}`")
-    yield from (
-        ((", ".join(names), text) for text, names in alike.items()) if alike else (("all", "no error"),)
-    )
-
-
 _READ = "[How to read these tables](reference/README.md#tables-of-keys) explains the columns."
 KINDS = {
-    "scenario-keys": Kind(json_schema, _of_scenarios),
+    "scenario-keys": Kind(json_schema, options_and_presets),
     "sweep-keys": Kind(sweep_json_schema),
     "plan-keys": Kind(plan_json_schema),
     "aircraft-keys": Kind(AircraftFile.model_json_schema),

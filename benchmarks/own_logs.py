@@ -16,26 +16,19 @@ faults, right names, wrong names in any row (the name of a group is wrong if the
 it). Then it has the share of samples and surfaces whose effectiveness lies within the bounds, and the same
 for the surface at fault alone, both where the bounds are narrower than 0 to 1; the share and the median
 width of these bounds; and the share of credible samples. The last column counts the losses that an
-informed test detects at one false alarm an hour: its log likelihood ratio exceeds the logarithm of the
-number of samples in an hour [Lorden1971]. This test knows the surface, the size, the instant, the design
-model of the aircraft, and the noise: a vector autoregression of the accelerations that the model does not
-explain in the training flights, for quiet and for noisy gyros.
+informed test detects (own_logs_informed.py).
 """
 
 import argparse
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
-from math import log as ln
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-import pandas as pd
-from benchmarks.page_test import Whitener, fitted
+from benchmarks.own_logs_informed import noises, told
 
 import beaver_ftc as bf
-from beaver_ftc.design.model import DesignFunctions, design_record
-from beaver_ftc.design.table import N_Y
 from beaver_ftc.documents import BadInput
 from beaver_ftc.results.recordings import RECORDING_FILE_OF_KIND
 from beaver_ftc.results.writer import run
@@ -183,45 +176,6 @@ def identified(logs: list[Log]) -> Model:
     return Model.model_validate_json(model_file_text(found))
 
 
-def unexplained(log: Log) -> tuple[np.ndarray, np.ndarray]:
-    """The acceleration of each frame that the design model does not explain, (n, 3) rad/s2, and the effect of
-    each healthy surface, (n, 3, S) rad/s2."""
-    aircraft, table = log.flown.airframe, pd.read_parquet(log.folder / "log.parquet")
-    model = DesignFunctions(design_record(aircraft))
-    rates = table[[f"{axis}_measured_rad_s" for axis in "pqr"]].to_numpy()
-    flow = table[["alpha_rad", "beta_rad", "airspeed_mps", "qdyn_pa", *aircraft.signals]].to_numpy()
-    flow = np.pad(flow, ((0, 0), (0, N_Y - flow.shape[1])))
-    commands = table[[f"{surface}_cmd_rad" for surface in aircraft.surfaces]].to_numpy()
-    does = np.array([model.G(y) for y in flow]) * commands[:, None, :]
-    expected = np.array([model.f(x, y) for x, y in zip(rates, flow, strict=True)]) + does.sum(axis=2)
-    return np.diff(rates, axis=0) * log.flown.rate_hz - expected[:-1], does[:-1]
-
-
-def noisy(log: Log) -> bool:
-    """Whether the gyros have noise."""
-    return bool(log.flown.sensors.p.noise_std_deg_s > 0.0)
-
-
-def noises(logs: list[Log]) -> dict[bool, Whitener]:
-    """The noise model of healthy flights, for quiet (False) and for noisy gyros (True)."""
-    left = {log.folder: unexplained(log)[0] for log in logs}
-    kinds = {noisy(log) for log in logs}
-    return {kind: fitted([left[one.folder] for one in logs if noisy(one) == kind]) for kind in kinds}
-
-
-def told(log: Log, noise: dict[bool, Whitener]) -> bool:
-    """Whether the informed test detects the loss before the flight ends."""
-    if noisy(log) not in noise or not log.flown.faults:
-        return False
-    (fault,), (left, does) = log.flown.faults, unexplained(log)
-    lost = -fault.magnitude * does[:, :, list(log.flown.airframe.surfaces).index(fault.actuator)]
-    lost[: round(fault.at_s * log.flown.rate_hz)] = 0.0
-    white = noise[noisy(log)]
-    seen, expected = white.respond(left), white.respond(lost)
-    ratio = np.cumsum((expected * (seen - 0.5 * expected)).sum(axis=1))
-    return bool(ratio.max() > ln(3600.0 * log.flown.rate_hz))
-
-
 def by_model(log: Log, model: Model) -> Said:
     """The diagnosis as of `diagnose --model`."""
     rows = diagnose(resample(read_vehicle_columns(log.path, model.vehicle), model.vehicle), model)
@@ -288,18 +242,6 @@ def _share(part: int, whole: int) -> str:
     return f"{part / whole:.3f}" if whole else ""
 
 
-def main() -> None:
-    """Fly, write, read and diagnose the flights, and print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--aircraft", default="beaver")
-    parser.add_argument("--air", choices=("none", "light", "moderate", "severe"), default="none")
-    parser.add_argument("--by", choices=BY, nargs="*", default=BY)
-    asked = parser.parse_args()
-    of = Campaign(asked.aircraft, asked.air, asked.seed)
-    print(markdown_table(HEAD, table(flown(of, asked.by))))
-
-
 def ways(of: Campaign, by: Sequence[str], logs: list[Log]) -> dict[str, Callable[[Log], Said]]:
     """The function that diagnoses a log by each of these models. logs: of the training flights."""
     found: dict[str, Callable[[Log], Said]] = {"aircraft": lambda log: by_aircraft(log, of)}
@@ -320,6 +262,18 @@ def flown(of: Campaign, by: Sequence[str]) -> list[Document]:
             certain = told(log, noise) if log.flown.faults else None
             results += [_tried(name, log, way) | {"told": certain} for name, way in tried.items()]
     return results
+
+
+def main() -> None:
+    """Fly, write, read and diagnose the flights, and print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--aircraft", default="beaver")
+    parser.add_argument("--air", choices=("none", "light", "moderate", "severe"), default="none")
+    parser.add_argument("--by", choices=BY, nargs="*", default=BY)
+    asked = parser.parse_args()
+    of = Campaign(asked.aircraft, asked.air, asked.seed)
+    print(markdown_table(HEAD, table(flown(of, asked.by))))
 
 
 if __name__ == "__main__":

@@ -112,7 +112,7 @@ class Refreshed:
         try:
             self._documents[name] = json.loads(output.text)
         except json.JSONDecodeError as error:
-            self._wrong(document.line, f"{document.origin.command} prints no JSON: {error}")
+            self._find(document.line, f"{document.origin.command} prints no JSON: {error}")
 
     def _number(self, number: Any) -> None:
         if number.name not in self._documents:
@@ -120,7 +120,7 @@ class Refreshed:
         try:
             new = values.printed(self._documents[number.name], number.place)
         except BadInput as error:
-            self._wrong(number.line, f"{number.name} {error}")
+            self._find(number.line, f"{number.name} {error}")
             return
         command = self.page.documents[number.name].origin.command
         what = f"{number.name} {number.place.path} of {command}"
@@ -131,7 +131,7 @@ class Refreshed:
         origin = made.origin
         output = self.printed[origin.command] if self.wanted.flies(origin) else None
         if output is not None and output.fault:
-            self._wrong(made.line, f"{origin.command} {output.fault}")
+            self._find(made.line, f"{origin.command} {output.fault}")
             return None
         if origin.dear:
             self._dear(made)
@@ -141,28 +141,27 @@ class Refreshed:
         """Flown: when, and by what code. Not flown: whether it is of today's code."""
         origin, probe = made.origin, self.printed.get(made.origin.probe)
         if probe is not None and probe.fault:
-            self._wrong(made.line, f"{origin.probe} {probe.fault}")
+            self._find(made.line, f"{origin.probe} {probe.fault}")
             return
         digest = digest_of(probe.text) if probe else "-"
         if self.wanted.flies(origin):
             at = f" | at {revision()} {datetime.now(UTC):%Y-%m-%d} {digest} -->"
             self._edits.append((*made.mark, _AT.sub(at, self.page.text[slice(*made.mark)])))
         elif missing(origin):
-            self._say(made.line, f"{origin.command} is not checked: it needs {origin.needs}")
+            self._find(made.line, f"{origin.command} is not checked: it needs {origin.needs}", said=True)
         elif not origin.at:
-            self._wrong(made.line, f"never printed: python -m tools.docs {self.page.name} --dear")
+            self._find(made.line, f"never printed: python -m tools.docs {self.page.name} --dear")
         elif probe is not None and origin.at[2] != digest:
-            told = f"not flown again since {origin.at[0]}" in self.page.text.replace("`", "")
-            (self._say if told else self._wrong)(
+            says = f"not flown again since {origin.at[0]}"
+            self._find(
                 made.line,
                 f"the probe has changed, {origin.at[2]} stands, {digest} is printed by {origin.probe}: "
-                f"python -m tools.docs {self.page.name} --dear, or a sentence in the page: not flown again "
-                f"since {origin.at[0]}",
+                f"python -m tools.docs {self.page.name} --dear, or a sentence in the page: {says}",
+                said=says in self.page.text.replace("`", ""),
             )
         elif changed_since(origin.at[0]):
-            self._say(
-                made.line, f"the code has changed since {origin.at[0]} ({origin.at[1]}): {origin.command}"
-            )
+            since = f"{origin.at[0]} ({origin.at[1]})"
+            self._find(made.line, f"the code has changed since {since}: {origin.command}", said=True)
 
     def _put(self, begin: int, end: int, new: str, command: str) -> None:
         """Put text in the place of what stands, and note where they differ first."""
@@ -185,11 +184,8 @@ class Refreshed:
                 words = f"docs/images/{name} is not what is drawn by {block.origin.command}"
                 self.changes.append(Finding(self.page.name, block.line, words))
 
-    def _wrong(self, line: int, words: str) -> None:
-        self.findings.append(Finding(self.page.name, line, words))
-
-    def _say(self, line: int, words: str) -> None:
-        self.findings.append(Finding(self.page.name, line, words, said=True))
+    def _find(self, line: int, words: str, said: bool = False) -> None:
+        self.findings.append(Finding(self.page.name, line, words, said))
 
 
 def _first_difference(old: str, new: str) -> tuple[int, str, str]:

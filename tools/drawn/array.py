@@ -47,17 +47,15 @@ class CoveringArray:
         """(cells, cells) bool: pairs that may not both count in one row."""
         n = len(self.cells)
         clash = np.zeros((n, n), dtype=bool)
-        for i, (name, level) in enumerate(self.cells):
-            for j, (other, level_there) in enumerate(self.cells[:i]):
-                wanted = self.factors[name].needs.get(other)
-                wanted_there = self.factors[other].needs.get(name)
-                unmet = (wanted is not None and level_there not in wanted) or (
-                    wanted_there is not None and level not in wanted_there
-                )
-                apart = forbidden(name, level, other, level_there) or forbidden(
-                    other, level_there, name, level
-                )
-                clash[i, j] = clash[j, i] = unmet or apart
+
+        def excludes(one: tuple[str, str], other: tuple[str, str]) -> bool:
+            name, level = other
+            needed = self.factors[one[0]].needs.get(name, (level,))
+            return level not in needed or forbidden(*one, *other)
+
+        for i, one in enumerate(self.cells):
+            for j, other in enumerate(self.cells[:i]):
+                clash[i, j] = clash[j, i] = excludes(one, other) or excludes(other, one)
         return clash
 
     def rows(self) -> Iterator[Row]:

@@ -40,10 +40,9 @@ class Checkout:
     def __init__(self, shared: Path, needed: Collection[str] = ()) -> None:
         self._running: set[int] = set()
         self._ended = False
-        own = {name for name in os.environ if name.startswith(_OURS) and name not in needed}
-        inherited = {name: value for name, value in os.environ.items() if name not in own}
+        inherited = os.environ.items()
         self.environment = {
-            **inherited,
+            **{name: value for name, value in inherited if name in needed or not name.startswith(_OURS)},
             "PATH": os.pathsep.join((str(shared / BIN), str(_BIN), os.environ.get("PATH", os.defpath))),
             "PYTHONPATH": f"{ROOT}{os.pathsep}{ROOT / 'src'}",
             "COLUMNS": "80",
@@ -113,7 +112,7 @@ def outputs(
     with tempfile.TemporaryDirectory() as shared, ThreadPoolExecutor(os.cpu_count()) as threads:
         checkout = Checkout(Path(shared), needed)
         served = None
-        if POSSIBLE and any("beaver-ftc" in line or "python -m" in line for line in lines):
+        if POSSIBLE and lines:
             (Path(shared) / BIN).mkdir()  # commands are forked from one process that has imported the package
             served = Served(Path(sys.executable), _BIN, checkout.environment)
             served.scripts(Path(shared) / BIN)

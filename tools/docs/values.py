@@ -20,9 +20,8 @@ class Place(NamedTuple):
     def read(cls, words: str) -> "Place":
         """Of words such as `delay.median_s .2f`, `share *100 .0f`. Raises ValueError for others."""
         path, *rest = shlex.split(words)
-        path, _, factor = path.partition("*")
-        factors = [factor] * bool(factor) + [word[1:] for word in rest if word.startswith("*")]
-        (factor,), (spec,) = factors or ["1"], [word for word in rest if not word.startswith("*")] or [""]
+        (factor,) = [word[1:] for word in rest if word.startswith("*")] or ["1"]
+        (spec,) = [word for word in rest if not word.startswith("*")] or [""]
         return cls(path, float(factor), spec)
 
 

@@ -8,7 +8,7 @@ half of a value to twice as much, in the mean over the flights: the least is cho
 measured. Prints a table; exit status 1 if a default is not what is chosen.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -113,17 +113,12 @@ def _rms(values: np.ndarray) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-def search() -> Iterator[tuple[Gain, dict[float, float], float]]:
-    """Each gain with the cost of each value tried, and the value chosen."""
+def main() -> None:
+    """Print each gain with the cost of each value tried, and the value chosen."""
+    agreed = True
     for gain in GAINS:
         costs = {value: cost(gain, value) for value in gain.ladder}
-        yield gain, costs, min(costs, key=lambda value: costs[value])
-
-
-def main() -> None:
-    """Print the table."""
-    agreed = True
-    for gain, costs, chosen in search():
+        chosen = min(costs, key=costs.__getitem__)
         agreed = agreed and chosen == gain.default
         tried = ", ".join(f"{value:g}: {found:.3g}" for value, found in costs.items())
         where = "scheme" if gain.group == DETECTORS else "law"

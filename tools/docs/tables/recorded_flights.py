@@ -94,21 +94,12 @@ def own_logs() -> str:
 
 def own_logs_of_aircraft() -> str:
     """The same of other aircraft, in turbulence and in still air."""
-    campaigns = [
-        own.Campaign(aircraft=aircraft, air=air, seed=seed)
-        for aircraft, air in AIRCRAFT_AND_AIR
-        for seed in AIRCRAFT_SEEDS
-    ]
+    campaigns = [own.Campaign(*of_it, seed) for of_it in AIRCRAFT_AND_AIR for seed in AIRCRAFT_SEEDS]
     with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
-        results_by_campaign = dict(zip(campaigns, pool.map(_by_identified, campaigns), strict=True))
+        flown = dict(zip(campaigns, pool.map(_by_identified, campaigns), strict=True))
     rows = []
     for aircraft, air in AIRCRAFT_AND_AIR:
-        results = [
-            one
-            for campaign, of_it in results_by_campaign.items()
-            if (campaign.aircraft, campaign.air) == (aircraft, air)
-            for one in of_it
-        ]
+        results = [one for seed in AIRCRAFT_SEEDS for one in flown[own.Campaign(aircraft, air, seed)]]
         rows += [
             [aircraft.removeprefix("jsbsim:"), AIR_TEXT[air], *row]
             for row in _own_rows(results, OWN_OF_AIRCRAFT)

@@ -15,15 +15,8 @@ from beaver_ftc_aircraft.gtm.database import read
 from beaver_ftc_aircraft.gtm.folder import write_model
 from beaver_ftc_aircraft.gtm.parameters import OUTPUTS, parameters
 from beaver_ftc_aircraft.gtm.steady import ALTITUDE_FT, HEADING_DEG, Bench, Condition, Steady, pitch_angle
-from tools.gtm.specification import (
-    DATABASE,
-    STEP_S,
-    SURFACES,
-    Controls,
-    Servos,
-    Specification,
-    axes_of,
-)
+from tools.gtm.servos import Servos
+from tools.gtm.specification import DATABASE, STEP_S, SURFACES, Controls, Specification, axes_of
 
 # The specification's letters, and the names here.
 NAMES = dict(

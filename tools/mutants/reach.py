@@ -7,7 +7,8 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from tools.mutants.making import Mutant
-from tools.mutants.scope import KEPT, ROOT, assigned, runs_at_import, tests, uses
+from tools.mutants.scope import KEPT, ROOT, tests
+from tools.mutants.syntax import assigned, runs_at_import, uses
 
 
 class Reach:

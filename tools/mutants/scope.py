@@ -12,6 +12,7 @@ from pathlib import Path
 import yaml
 
 from tools.mutants.making import Mutant, mutants
+from tools.mutants.syntax import imports, tree
 
 ROOT = Path(__file__).parents[2]
 SOURCES = ROOT / "src"
@@ -67,7 +68,7 @@ def _in_compiled_code(file: Path, line: int) -> bool:
     """Whether a line changes a kernel: a line of a kernel, of a constant, or of the layout of a record."""
     if file not in _compiled(SOURCES):
         return False
-    around = (node for node in _tree(file).body if node.lineno <= line <= (node.end_lineno or 0))
+    around = (node for node in tree(file).body if node.lineno <= line <= (node.end_lineno or 0))
     for node in around:
         if isinstance(node, ast.FunctionDef):
             kernel = any(ast.unparse(each).startswith(("kernel", "apart")) for each in node.decorator_list)
@@ -78,22 +79,16 @@ def _in_compiled_code(file: Path, line: int) -> bool:
 @cache
 def _compiled(sources: Path) -> frozenset[Path]:
     """The modules with kernels, and the modules whose constants these kernels contain."""
-    found = {file for file in sources.rglob("*.py") if "beaver_ftc.compiled" in _imports(file)}
+    found = {file for file in sources.rglob("*.py") if "beaver_ftc.compiled" in imports(file)}
     due = list(found)
     while due:
-        for module, names in _imports(due.pop()).items():
+        for module, names in imports(due.pop()).items():
             file = (sources / module.replace(".", "/")).with_suffix(".py")
             constants = any(name.lstrip("_").isupper() for name in names)
             if constants and _is_quick(file) and file not in found and file.exists():
                 found.add(file)
                 due.append(file)
     return frozenset(found)
-
-
-def _imports(file: Path) -> dict[str, list[str]]:
-    """{module: names} that a module imports."""
-    nodes = (node for node in ast.walk(_tree(file)) if isinstance(node, ast.ImportFrom))
-    return {node.module or "": [alias.name for alias in node.names] for node in nodes}
 
 
 def left_out() -> list[str]:
@@ -163,29 +158,3 @@ def stale() -> list[str]:
     files = {SOURCES / name.split(":")[0] for name in known}
     there = {mutant.name(SOURCES) for file in files if file.exists() for mutant in mutants(file)}
     return sorted(known - there)
-
-
-def runs_at_import(file: Path, line: int) -> bool:
-    """Whether a line is outside of all functions, so that every user of the module uses its result."""
-    functions = (node for node in ast.walk(_tree(file)) if isinstance(node, ast.FunctionDef))
-    return not any(node.body[0].lineno <= line <= (node.end_lineno or 0) for node in functions)
-
-
-def assigned(file: Path, line: int) -> set[str]:
-    """The names of a module to which its statement at a line gives a value."""
-    around = (node for node in _tree(file).body if node.lineno <= line <= (node.end_lineno or 0))
-    values = (node for node in around if isinstance(node, ast.Assign | ast.AnnAssign))
-    every = (inner for node in values for inner in ast.walk(node))
-    return {node.id for node in every if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)}
-
-
-def uses(file: Path, names: set[str]) -> set[int]:
-    """The lines of a module at which one of these names is read."""
-    every = (node for node in ast.walk(_tree(file)) if isinstance(node, ast.Name | ast.Attribute))
-    named = ((node, node.id if isinstance(node, ast.Name) else node.attr) for node in every)
-    return {node.lineno for node, name in named if name in names and isinstance(node.ctx, ast.Load)}
-
-
-@cache
-def _tree(file: Path) -> ast.Module:
-    return ast.parse(file.read_text())

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from tools.autopilots import peers
-from tools.autopilots.small import Circuit
+from tools.autopilots.circuit import Circuit
 
 import beaver_ftc as bf
 from beaver_ftc.documents.errors import BadInput

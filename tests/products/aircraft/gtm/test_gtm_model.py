@@ -68,10 +68,12 @@ def heavy(where, bench, specified):
 def test_velocities_are_continuous_through_damage_and_what_follows_is_the_same(bench, heavy, case):
     """From a state with rates and sideslip, half a second before the damage and half a second after."""
     steady = flights.specified_trim(heavy, Condition(alpha_deg=3.0), bench.steady(Condition(alpha_deg=3.0)))
-    start = np.array([160.0, 3.0, 9.0, 0.1, -0.05, 0.06, 0.3, 0.08, 1.5, 800.0])
     commands = flights.of_steady(steady)
     commands.surfaces["FLAPLOB"] = 5.0
-    flight = flights.Manoeuvre("damage", start, lambda t: commands, 1.0, case, 0.5)
+    flight = flights.Manoeuvre(
+        "damage", np.array([160.0, 3.0, 9.0, 0.1, -0.05, 0.06, 0.3, 0.08, 1.5, 800.0]), lambda t: commands,
+        1.0, case, 0.5,
+    )  # fmt: skip
     one, other = flight.by_specification(heavy), flight.by_jsbsim(bench, FINE_S, ADAMS_BASHFORTH)
     assert (flights.largest(one, other)[MOTION] < 0.01).all()
     jump = np.abs(np.diff(other[:, MOTION], axis=0)).max(axis=0)

@@ -7,6 +7,7 @@ import numpy as np
 from beaver_ftc.design.model import DesignFunctions, acceleration_at
 from beaver_ftc.design.table import AIRSPEED
 from beaver_ftc.diagnosis.bounds import Y0
+from beaver_ftc.diagnosis.gusts_design import air_rotation_slopes
 from beaver_ftc.diagnosis.model_prediction import servo_data
 from beaver_ftc.scenario.declared import Declared
 
@@ -45,13 +46,6 @@ def plugin_errors(declared: Declared, model: np.ndarray, y: np.ndarray, u: np.nd
         deflection_rad=declared.deflection_rad,
         model_rad_s2=model_error_std(model, y, u, sigma, dC, declared.deflections_rad),
     )
-
-
-def air_rotation_slopes(model: DesignFunctions, y: np.ndarray) -> np.ndarray:
-    """Angular acceleration of an aircraft at rest in air that rotates, (3, 3) 1/s: -df/dx without rates, by
-    central differences with steps of 1e-4 rad/s."""
-    steps = 1e-4 * np.eye(3)
-    return -((model.f(steps, y) - model.f(-steps, y)) / 2e-4).T
 
 
 def model_error_std(

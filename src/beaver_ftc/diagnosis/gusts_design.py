@@ -10,6 +10,7 @@ import numpy as np
 
 from beaver_ftc.aircraft.aircraft import EARTH_RATE_RAD_S, FORCES, GRAVITY_MPS2
 from beaver_ftc.compiled import fill
+from beaver_ftc.design.model import DesignFunctions
 from beaver_ftc.design.plain_model import jacobian
 from beaver_ftc.design.table import AIRSPEED, fill_table
 from beaver_ftc.design.turbulence import SCALE_M, rotation_lengths
@@ -70,6 +71,13 @@ def add_gust_noise(
         forces["gust_noise"] = gust_noise(by_forces, design, y, u, span)
     for name in ("Q0", "Q"):
         stat["noise"][name] += gust_noise(std, design, y, u, span) ** 2
+
+
+def air_rotation_slopes(model: DesignFunctions, y: np.ndarray) -> np.ndarray:
+    """Angular acceleration of an aircraft at rest in air that rotates, (3, 3) 1/s: -df/dx without rates, by
+    central differences with steps of 1e-4 rad/s."""
+    steps = 1e-4 * np.eye(3)
+    return -((model.f(steps, y) - model.f(-steps, y)) / 2e-4).T
 
 
 def flow_noise(errors: SensorErrors, V: float) -> np.ndarray:

@@ -10,7 +10,7 @@ from beaver_ftc.compiled import fill
 from beaver_ftc.design.model import DesignFunctions
 from beaver_ftc.design.turbulence import Dryden
 from beaver_ftc.diagnosis.bounds_design import GUST_LIMIT_SIGMA
-from beaver_ftc.diagnosis.deviations import air_rotation_slopes
+from beaver_ftc.diagnosis.gusts_design import air_rotation_slopes
 from beaver_ftc.diagnosis.monitors.flow_or_force import N_FROZEN_NEVER
 from beaver_ftc.diagnosis.monitors.numbering import FILTER_POLES_PER_S, NO_SENSOR
 from beaver_ftc.plant.instruments import ENGINE_SPEED, MANIFOLD, PHI, SENSORS

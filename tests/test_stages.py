@@ -5,7 +5,7 @@
     Output    written by the kernels of one file, read by any
 
 A field counts whose name is declared once, by `record(...)` or in PARTS: whose record a common name belongs
-to, the tree does not say. The lists below are the exceptions: there are none.
+to, the tree does not say. The lists below are the exceptions.
 """
 
 import ast
@@ -19,10 +19,10 @@ import beaver_ftc
 ROOT = Path(beaver_ftc.__file__).parent
 COMPILED = {"kernel", "apart", "lazy_kernel"}
 
-SEVERAL_FILES: set[str] = set()
+SEVERAL_FILES = {"std", "e_G"}  # of the rows: rates.py and forces.py fill their own
 OTHER_FOLDER: set[str] = set()
 # Fields of one record, which is put together elsewhere
-PARTS = {"TEST_FIELDS", "ISOLATION_FIELDS", "GYRO_FIELDS", "FLOW_FIELDS"}
+PARTS = {"TEST_FIELDS", "ISOLATION_FIELDS", "GYRO_FIELDS", "FLOW_FIELDS", "TURN_FIELDS"}
 
 
 @cache

@@ -18,7 +18,6 @@ from beaver_ftc.diagnosis.detection.blocks import (
     USUAL_HYPOTHESES,
     BlockCapacity,
     block_dtype,
-    reset_slot,
     restarting_slot,
 )
 
@@ -113,7 +112,7 @@ def weigh_all(block, innovations, signatures, regressors, dt):
     """Show a block innovations (k, n), signatures (k, h, n) and regressors (k, j, n), as a flight does."""
     n, n_h, n_Z = int(block["n"]), int(block["n_h"]), int(block["n_Z"])
     for k in range(len(innovations)):
-        reset_slot(block, restarting_slot(k))
+        likelihood.reset_slot(block, restarting_slot(k))
         block["nu"][:n] = innovations[k]
         block["regressor"][:n_Z, :n] = regressors[k]
         block["hypothesis"]["signature"][:n_h, :n] = signatures[k]

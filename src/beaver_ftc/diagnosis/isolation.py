@@ -44,7 +44,7 @@ import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.compiled import fill, kernel, record, sized
-from beaver_ftc.diagnosis.detection import statistical
+from beaver_ftc.diagnosis.detection import parity, statistical
 from beaver_ftc.diagnosis.detection.intervals import advance_reach, is_reachable
 from beaver_ftc.diagnosis.error_map import level_of_share, share_used
 from beaver_ftc.diagnosis.estimators import ESTIMATOR_RECORD, narrow_sets, theta_explains, update_residual
@@ -295,6 +295,13 @@ def decide_isolation(iso, t):
     if n == 0:
         return UNANTICIPATED
     return remaining if n == 1 and t - last_exclusion_s >= iso.config.hold_s else NOT_ISOLATED
+
+
+@kernel
+def weigh_views(fie, stat, G):
+    """Fill `unlikely` of estimator fie: whether a parity view shows motion that its surface, with this column
+    (3,) of G, cannot cause."""
+    fie.unlikely = parity.views_exclude(stat, fie.surface, G)
 
 
 @kernel

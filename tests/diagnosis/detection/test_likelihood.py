@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from innovations import block_of, bounded_all, by_onset, covariance, drawn, weigh_all, with_hypotheses
 
 from beaver_ftc.diagnosis.detection import likelihood, whitening
-from beaver_ftc.diagnosis.detection.blocks import N_SLOTS, STEP_FAULT, reset_slot, restarting_slot
+from beaver_ftc.diagnosis.detection.blocks import N_SLOTS, STEP_FAULT, restarting_slot
 from beaver_ftc.diagnosis.state import LOSS
 from samples import samples
 
@@ -47,7 +47,7 @@ def test_evidence_and_information_of_every_onset_are_those_of_least_squares(case
     for slot, onset in _onsets(frames).items():
         for h in range(2):
             s = np.where(np.arange(frames)[:, None] >= onset, signatures[:, h], 0.0).ravel()
-            information, correlation = by_onset(block, "information"), by_onset(block, "correlation")
+            information, correlation = by_onset(block, "D"), by_onset(block, "N")
             assert information[slot, h] == pytest.approx(s @ inverse @ s, rel=1e-6)
             assert correlation[slot, h] == pytest.approx(s @ inverse @ nu.ravel(), rel=1e-6, abs=1e-9)
             overlap = [s @ inverse @ regressors[:, j].ravel() for j in range(3)]
@@ -75,8 +75,8 @@ def test_a_bounded_uncertainty_adds_no_more_than_is_allowed_for(case, seed, cour
     if course == "against the weights":
         d[settled:] = eta_bar * np.sign(np.gradient(signature[settled:, 0], axis=0))
     bounded_all(block, d, signature, settled, DT)
-    known = by_onset(block, "information")[:, 0] > 0.0
-    correlation = by_onset(block, "correlation")[:, 0]
+    known = by_onset(block, "D")[:, 0] > 0.0
+    correlation = by_onset(block, "N")[:, 0]
     assert np.all((np.abs(correlation) <= _allowed(block) + 1e-9)[known])
 
 
@@ -109,7 +109,7 @@ def _largest_share(block, innovations, moments):
     """Largest evidence for a loss, in standard deviations, innovations and moments (k,) rad/s2."""
     block["alarm_level"], most = 0.0, 0.0
     for k, (nu, moment) in enumerate(zip(innovations, moments, strict=True)):
-        reset_slot(block, restarting_slot(k))
+        likelihood.reset_slot(block, restarting_slot(k))
         block["nu"][0], block["hypothesis"][0]["signature"][0] = nu, moment
         if block["calm"]["n"]:
             whitening.whiten_calm(block, FRAME_S)

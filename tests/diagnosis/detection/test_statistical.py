@@ -6,8 +6,8 @@ from innovations import drawn
 
 from beaver_ftc.aircraft import AXES, load
 from beaver_ftc.compiled import copy, kernel
-from beaver_ftc.diagnosis.detection import statistical, statistical_design
-from beaver_ftc.diagnosis.detection.blocks import DRIFT_PRIOR_RAD_S2, N_SLOTS, reset_slot
+from beaver_ftc.diagnosis.detection import likelihood, statistical, statistical_design
+from beaver_ftc.diagnosis.detection.blocks import DRIFT_PRIOR_RAD_S2, N_SLOTS
 from beaver_ftc.diagnosis.detection.rows import RATES
 from beaver_ftc.loop.assembly import configure_design
 from beaver_ftc.plant.instruments import MEASURED
@@ -80,7 +80,7 @@ def watch_all(detector, innovations, Gu, cubic, first, renew, dt, scores):
         if renew and alarm.ratio > 1.0:
             for slot in range(N_SLOTS):
                 for b in range(detector.block.size):
-                    reset_slot(blocks[b], slot)
+                    likelihood.reset_slot(blocks[b], slot)
 
 
 def surfaces_at_work(frames, rate_hz, rng, size=0.3):

@@ -131,14 +131,3 @@ def n_test_groups(n_h):
 def tests_in_group(b, i):
     """The number of onset tests in use in group i: the first entries of each array."""
     return min(b.n_h - i * GROUP_SIZE, GROUP_SIZE) * N_SLOTS
-
-
-@kernel
-def reset_slot(b, slot):
-    """Restart a slot of every hypothesis: its onset is the frame that is added next, its evidence zero."""
-    for group in range(n_test_groups(b.n_h)):
-        t = b.tests[group]
-        for k in range(slot, tests_in_group(b, group), N_SLOTS):
-            t.left[k] = 1.0
-            t.N[k] = t.D[k] = t.N_p[k] = t.N_c[k] = 0.0
-            t.e_0[k] = t.e_tv[k] = t.e_w[k] = t.w[:, k] = t.x_s[:, k] = b.R[group, : b.n_Z, k] = 0.0

@@ -76,6 +76,17 @@ RINGING_FACTOR = 1.2
 
 
 @kernel
+def reset_slot(b, slot):
+    """Restart a slot of every hypothesis: its onset is the frame that is added next, its evidence zero."""
+    for group in range(n_test_groups(b.n_h)):
+        t = b.tests[group]
+        for k in range(slot, tests_in_group(b, group), N_SLOTS):
+            t.left[k] = 1.0
+            t.N[k] = t.D[k] = t.N_p[k] = t.N_c[k] = 0.0
+            t.e_0[k] = t.e_tv[k] = t.e_w[k] = t.w[:, k] = t.x_s[:, k] = b.R[group, : b.n_Z, k] = 0.0
+
+
+@kernel
 def bound_responses(b, dt):
     """Fill eta_0 = eta |g_0| and eta_r = RINGING_FACTOR |K_d^-1| eta, (2,) rad/s.
 

@@ -69,7 +69,6 @@ from beaver_ftc.diagnosis.detection.blocks import (
     USUAL_HYPOTHESES,
     BlockCapacity,
     block_dtype,
-    reset_slot,
     restarting_slot,
 )
 from beaver_ftc.diagnosis.detection.directions import project
@@ -235,7 +234,7 @@ def update_views(stat, vaned, y, dt, k, latched):
             continue
         project_view(view, stat, vaned, y[AIRSPEED])
         if not latched:
-            reset_slot(view.block, slot)
+            likelihood.reset_slot(view.block, slot)
         likelihood.update_block(view.block, dt, decay)
         # The error of the integrated angle oscillates with the aircraft's own modes.
         if view.block.source != INERTIAL:

@@ -40,7 +40,6 @@ from beaver_ftc.diagnosis.detection.blocks import (
     PITCH_BLOCK,
     REVERTING_BLOCK,
     block_dtype,
-    reset_slot,
     restarting_slot,
 )
 from beaver_ftc.diagnosis.detection.forces import FORCES_RECORD
@@ -111,7 +110,7 @@ def update_blocks(stat, dt, k, alarmed, may_end=False):
     slot = restarting_slot(k)
     for m, b in enumerate(blocks):
         if not alarmed:
-            reset_slot(b, slot)
+            likelihood.reset_slot(b, slot)
         project_rows(b, stat.rows)
         b.has_coarse = gust.config.coarse_only
         if gust.config.coarse_only:

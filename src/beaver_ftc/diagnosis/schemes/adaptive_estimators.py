@@ -19,7 +19,7 @@ The isolation depends on the fault class, and on the detectors whose exclusions 
 from beaver_ftc.compiled import apart, kernel
 from beaver_ftc.design.table import ALPHA, BETA
 from beaver_ftc.diagnosis import conclusion, estimators, isolation
-from beaver_ftc.diagnosis.detection import fdae, filters, parity
+from beaver_ftc.diagnosis.detection import fdae, filters
 from beaver_ftc.diagnosis.monitors import engine_monitor, sensor_monitor
 from beaver_ftc.diagnosis.schemes.statistical_frame import update_tests
 from beaver_ftc.diagnosis.state import STATISTICAL_DETECTOR, UNANTICIPATED, WORST_CASE_DETECTOR, YAW
@@ -85,10 +85,10 @@ def weigh_loss(fdi, j):
 
 @apart(long_loops=True)
 def weigh_position(fdi, j):
-    """Fill `unlikely` of estimator j: whether a parity view shows motion that its surface cannot cause."""
+    """Fill `unlikely` of estimator j by the parity views."""
     stat, fies = fdi.statistical, fdi.isolation.estimator
     G = fies[fdi.layout.position[fies[j].surface]].effect.Z
-    fies[j].unlikely = parity.views_exclude(stat, fies[j].surface, G)
+    isolation.weigh_views(fies[j], stat, G)
 
 
 @kernel

@@ -6,7 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import lsq_linear
 
-from beaver_ftc.control import allocation, general_allocation, least_squares
+from beaver_ftc.control import allocation, least_squares
+from beaver_ftc.control.general_allocation import allocate_generally
 from beaver_ftc.control.least_squares import problem_dtype
 from beaver_ftc.diagnosis.model_prediction import prediction_dtype
 from law_records import new_control
@@ -84,7 +85,7 @@ def generally(demand, left, share, at=None, step=np.inf):
     prediction["u"] = TRIM if at is None else at
     effectiveness = control["surfaces"]["output"]["effectiveness"]
     parts = control["axes"], control["allocation"], control["layout"], effectiveness
-    general_allocation.allocate_generally(*parts, prediction, share, 0.0)
+    allocate_generally(*parts, prediction, share, 0.0)
     return control["allocation"]["output"]
 
 

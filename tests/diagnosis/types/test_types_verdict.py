@@ -17,7 +17,7 @@ from beaver_ftc.diagnosis.types import (
     remaining,
     verdict,
 )
-from beaver_ftc.diagnosis.types.registry import N_TYPES
+from beaver_ftc.diagnosis.types.registry import CONSTANT, N_TYPES, SAME_NAME
 from beaver_ftc.diagnosis.types.verdict import (
     NO_SURFACE,
     SEVERAL_SURFACES,
@@ -101,11 +101,11 @@ NOBODY_ELSE = {"aileron": None, "elevator": None, "flap": None}
 )
 def test_what_kind_of_fault_it_may_be(kinds, fixed, one_type, sole_shown):
     _, surface = one(*kinds)
-    same_name = remaining.SAME_NAME[sole_shown] if sole_shown >= 0 else -1
+    same_name = SAME_NAME[sole_shown] if sole_shown >= 0 else -1
     assert (modes.choose_mode(surface) == GIVE_UP) == fixed
-    assert max(remaining.sole_type(surface, remaining.CONSTANT), -1) == one_type
+    assert max(remaining.sole_type(surface, CONSTANT), -1) == one_type
     found = remaining.sole_shown_type(surface, remaining.ALL)
-    assert (remaining.SAME_NAME[found] if found >= 0 else -1) == same_name
+    assert (SAME_NAME[found] if found >= 0 else -1) == same_name
 
 
 def test_the_sole_surface_that_is_possible():

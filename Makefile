@@ -17,7 +17,7 @@ FAST := tests/aircraft tests/design tests/plant tests/results tests/scenario $(w
 # Files whose tests compile nothing are among them: together they take about as long as tests/warm.py, for which all other
 # tests wait.
 PLAIN := tests/design $(wildcard tests/*/test_*_kernels.py tests/*/*/test_*_kernels.py) \
-  $(addprefix tests/diagnosis/,test_model_prediction_coarse_frames.py test_isolation_membership.py test_short_flights.py types/test_types_verdict.py test_bounds_derived.py detection/test_likelihood.py) \
+  $(addprefix tests/diagnosis/,test_short_flights.py types/test_modes.py test_bounds_derived.py detection/test_likelihood.py) \
   $(addprefix tests/control/test_,decisions.py laws.py supervisor.py compiled_rivals.py) \
   tests/control/laws/test_gains.py tests/diagnosis/rivals/test_filters.py \
   $(addprefix tests/scenario/test_,dump.py given.py loader.py aircraft_folder.py) \

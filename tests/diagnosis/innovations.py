@@ -18,7 +18,6 @@ from beaver_ftc.diagnosis.detection.blocks import (
     USUAL_HYPOTHESES,
     BlockCapacity,
     block_dtype,
-    restarting_slot,
 )
 
 
@@ -49,18 +48,6 @@ def by_onset(block, name):
     """What the onset tests keep under a name, a copy, (..., slots, hypotheses)."""
     kept = np.concatenate(list(block["R"] if name == "R" else block["tests"][name]), axis=-1)
     return kept.reshape(*kept.shape[:-1], -1, N_SLOTS).swapaxes(-1, -2)
-
-
-def covariance(block, frames, dt):
-    """Of the stacked innovations (frames n,), frame by frame, from the model's very definition."""
-    n = int(block["n"])
-    k = np.arange(frames)
-    kept = block["a"] ** (k[:, None] - k[None, :] - 1) * (k[None, :] < k[:, None])  # of v[column] in d[row]
-    walk = np.kron(dt * kept @ kept.T, block["Q_d"][:n, :n])
-    constant = np.kron(block["a"] ** np.add.outer(k, k), block["P_dd"][:n, :n])
-    difference = (2.0 * np.eye(frames) - np.eye(frames, k=1) - np.eye(frames, k=-1)) / dt**2
-    gyros = np.kron(difference, np.diag(block["R_y"][:n]))
-    return constant + walk + gyros + np.kron(np.eye(frames), np.diag(block["Q_x"][:n]))
 
 
 def drawn(block, frames, dt, rng, start=0.0):
@@ -106,17 +93,6 @@ def filter_all(block, innovations, dt, out):
         whitening.advance_covariance(block, dt)
         copy(innovations[k], block.nu[: block.n])
         whitening.whiten_step(block, block.state, block.nu, dt, out[k])
-
-
-def weigh_all(block, innovations, signatures, regressors, dt):
-    """Show a block innovations (k, n), signatures (k, h, n) and regressors (k, j, n), as a flight does."""
-    n, n_h, n_Z = int(block["n"]), int(block["n_h"]), int(block["n_Z"])
-    for k in range(len(innovations)):
-        likelihood.reset_slot(block, restarting_slot(k))
-        block["nu"][:n] = innovations[k]
-        block["regressor"][:n_Z, :n] = regressors[k]
-        block["hypothesis"]["signature"][:n_h, :n] = signatures[k]
-        likelihood.update_block(block, dt, 1.0)
 
 
 @kernel

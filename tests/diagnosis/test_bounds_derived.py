@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 from beaver_ftc.design.model import design_record, nonlinear_response
 from beaver_ftc.diagnosis.bounds import add_declared_bound
 from beaver_ftc.diagnosis.bounds_design import inertia_bounds
-from beaver_ftc.diagnosis.detection.filters import advance_bound
 from beaver_ftc.loop.assembly import configure_design
 from beaver_ftc.scenario.schema import Scenario
 from samples import samples
@@ -102,18 +101,3 @@ def test_inertia_coefficients_are_extreme_at_the_corners(seed):
     change = {n: getattr(MASS, n) * (1 + rng.uniform(-tolerance, tolerance)) for n in names}
     there, nominal = (np.array(inertia_coefficients(m)) for m in (replace(MASS, **change), MASS))
     assert (np.abs(there - nominal) <= inertia_bounds(tolerance, MASS) * (1 + 1e-12)).all()
-
-
-@settings(max_examples=samples(100), deadline=None)
-@given(st.integers(0, 2**32), st.floats(0.0, 1.0), st.integers(1, 60))
-def test_filtered_noise_stays_within_its_bound_and_can_reach_it(seed, a, frames):
-    """eps[k+1] = a eps[k] + n[k+1] - n[k]; the worst noise keeps one sign until the last frame."""
-    rng = np.random.default_rng(seed)
-    nbar = rng.uniform(0.5, 1.5, frames + 1)
-    for n in (rng.uniform(-nbar, nbar), np.append(-nbar[:-1], nbar[-1])):
-        eps, filtered = 0.0, nbar[0]
-        for k in range(frames):
-            eps = a * eps + n[k + 1] - n[k]
-            filtered = advance_bound(filtered, 0.0, a, 1.0, nbar[k])
-        assert abs(eps) <= filtered + nbar[-1] + 1e-12
-    assert abs(eps) == pytest.approx(filtered + nbar[-1], rel=1e-9)

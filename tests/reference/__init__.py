@@ -10,6 +10,9 @@ It depends on no name of the package but its public ones (flights.py), so the pa
     detection.py     bank of filters, poles, thresholds, alarm              detection.md
     isolation.py     hypotheses, estimators, tests 1 to 4, decision         isolation.md, fault-types.md
                      gradients and norm bounds of scheme zhang2005          paper, sec. IV
+    types.py         places of a surface, sets of each type, releases       fault-types.md
+    naming.py        from the types left to surface, type and candidates    fault-types.md
+    pairs.py         the same with two faults at once                       fault-types.md
     noise.py         drift, variances, unknown constants and their bounds  statistical.md
     statistical.py   whitened innovation, tests, scores, which loss         statistical.md
     diagnosis.py     a whole flight, and the residual after the alarm
@@ -17,9 +20,9 @@ It depends on no name of the package but its public ones (flights.py), so the pa
 flights.py, scenarios.py, comparison.py and test_against_flights.py fly a covering array and compare column by
 column.
 
-Not here, and not compared: the weights of the network (its output is read from the log), names of fault types
-and what is decided of `fault_class: all` (residuals, limits and exclusions of its hypotheses are), verdicts
-of pairs, the statistical detector in turbulence (gusts, calm air) and of `fault_class: all` (parity
+Not here, and not compared: the weights of the network (its output is read from the log), the names of
+`fault_class: all` with `fault_profile: abrupt` (there the rest of a surface that the law gives up is
+evidence), the statistical detector in turbulence (gusts, calm air) and of `fault_class: all` (parity
 directions, forces, oscillations), the sensor monitor, probing, damage, turbulence below 150 m, changes of
 the declaration in flight. Of a fault inside a frame of several JSBSim steps only abrupt ones are compared.
 """

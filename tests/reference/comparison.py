@@ -7,6 +7,7 @@ import numpy as np
 import beaver_ftc as bf
 from reference.diagnosis import Result, diagnose
 from reference.flights import declared, read
+from reference.naming import Withdrawn
 
 RTOL, ATOL = 1e-9, 1e-12
 OF_SUMS = 1e-6  # of what is a sum over a flight, and a share of it
@@ -73,13 +74,22 @@ def _verdict(metrics: dict[str, Any], reference: Result, document: dict[str, Any
         ("detection.time_s", None if k is None else k * dt, detection["time_s"]),
         ("detection.axis", axis, detection["axis"]),
     ]
-    if document["fdi"]["fault_class"] == "published":
+    of_all_types = document["fdi"]["fault_class"] == "all"
+    if not of_all_types or document["fdi"]["fault_profile"] == "any":
         at, name = reference.names[-1] if reference.names else (0, None)
+        said = isolation["faults"] or [isolation] if reference.alarm else []
         pairs += [
             ("isolation.fault", name, isolation["fault"]),
             ("isolation.time_s", at * dt if name else None, isolation["time_s"]),
-            ("isolation.candidates", reference.candidates, list(isolation["candidates"])),
+            (
+                "isolation.faults",
+                [(one.name, one.kind, one.candidates) for one in reference.findings],
+                [(one["fault"], one["type"], list(one["candidates"])) for one in said],
+            ),
         ]
+        if of_all_types:
+            gone = isolation["withdrawn"], isolation.get("types_withdrawn") or ()
+            pairs.append(("withdrawn", reference.withdrawn, tuple(_frames(listed, dt) for listed in gone)))
     return [
         f"{what}: page {ours!r}, metrics {theirs!r}"
         for what, ours, theirs in pairs
@@ -91,3 +101,10 @@ def _same(ours: Any, theirs: Any) -> bool:
     if isinstance(ours, float) and isinstance(theirs, float):
         return abs(ours - theirs) < 1e-6
     return bool(ours == theirs)
+
+
+def _frames(withdrawn: Any, dt: float) -> list[Withdrawn]:
+    return [
+        (one["fault"], one.get("type"), round(one["from_s"] / dt), round(one["to_s"] / dt))
+        for one in withdrawn
+    ]

@@ -11,9 +11,12 @@ from reference.bounds import Bounds, gyro_error
 from reference.declaration import AXES, Declaration
 from reference.detection import Bank
 from reference.isolation import Frame, Isolation
+from reference.naming import UNANTICIPATED, Finding, Naming, Withdrawn
 from reference.noise import Noise
+from reference.pairs import Pairs
 from reference.prediction import DesignModel, Frames, frames_of, mean_of_frames, servo_positions
 from reference.statistical import Statistical
+from reference.types import Loss
 
 
 class Readings(NamedTuple):
@@ -35,12 +38,14 @@ class Readings(NamedTuple):
 
 class Result(NamedTuple):
     """columns: arrays by the names of log.parquet, a row for each frame. alarm: (frame, axis) or None; names:
-    (frame, name) of each change of the name, None for none. candidates: hypotheses left at the end."""
+    (frame, name) of each change of the name, None for none. findings: what is said at the end. withdrawn:
+    names, and types of names that stayed, of faults of all types."""
 
     columns: dict[str, np.ndarray]
     alarm: tuple[int, str] | None
     names: list[tuple[int, str | None]]
-    candidates: list[str]
+    findings: list[Finding]
+    withdrawn: tuple[list[Withdrawn], list[Withdrawn]]
 
 
 class Flight(NamedTuple):
@@ -84,7 +89,11 @@ def diagnose(declaration: Declaration, readings: Readings) -> Result:
         noise = Noise(declaration, bounds, readings.trim)
         detector = Statistical(declaration, noise, frames)
     isolation = Isolation(declaration, bank, frames, bounds, G[0])
-    result = Verdict(declaration, flight, bank, isolation, detector).of_flight(columns)
+    naming = None
+    if declaration.all_types:
+        kind = Pairs if declaration["pairs"] else Naming
+        naming = kind(declaration, isolation, bank, bounds, G, readings.command)
+    result = Verdict(declaration, flight, bank, isolation, detector, naming).of_flight(columns)
     if result.alarm:
         residual = approximation_residual(declaration, bank, result.alarm[0], flight, readings)
         for i, axis in enumerate(AXES):
@@ -127,10 +136,10 @@ class Verdict:
 
     def __init__(
         self, declaration: Declaration, flight: Flight, bank: Bank, isolation: Isolation,
-        detector: Statistical | None,
+        detector: Statistical | None, naming: Naming | None,
     ) -> None:  # fmt: skip
         self.declaration, self.flight, self.bank, self.isolation = declaration, flight, bank, isolation
-        self.detector = detector
+        self.detector, self.naming = detector, naming
         authority = declaration["authority"] if detector else "worst-case"
         self.by_worst_case = authority != "statistical"
         self.by_likelihood = detector if authority != "worst-case" else None
@@ -158,8 +167,14 @@ class Verdict:
             columns[f"fie_{one.name}_excluded"] = excluded[:, row]
         columns |= shares
         columns |= {f"{s}_effectiveness_estimate": effectiveness[:, j] for j, s in enumerate(surfaces)}
-        left = [one.name for one, out in zip(of, self.isolation.excluded, strict=True) if not out]
-        return Result(columns, self.alarm, self.names, left if self.alarm else [])
+        name, withdrawn = self.names[-1][1] if self.names else None, ([], [])
+        if self.naming:
+            findings, withdrawn = self.naming.findings(name), (self.naming.withdrawn, self.naming.retyped)
+        else:
+            left = [one.name for one, out in zip(of, self.isolation.excluded, strict=True) if not out]
+            kind = name if name in (None, UNANTICIPATED) else Loss.name
+            findings = [Finding(name, kind, None, left)]
+        return Result(columns, self.alarm, self.names, findings if self.alarm else [], withdrawn)
 
     def take(self, k: int) -> None:
         """A frame: alarm if there was none, then exclusions and the name."""
@@ -174,7 +189,10 @@ class Verdict:
             self.isolation.start(frame)
         if self.alarm:
             self.isolation.exclude(of, frame, started, self.by_worst_case, self.by_likelihood)
-            name = self.isolation.decide(self.by_likelihood)
+            if self.naming:
+                name = self.naming.take(frame, of, started or self.isolation.remembers)
+            else:
+                name = self.isolation.decide(self.by_likelihood)
             if name != (self.names[-1][1] if self.names else None):
                 self.names.append((k, name))
 

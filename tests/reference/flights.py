@@ -54,8 +54,8 @@ def _by_the_step(document: dict[str, Any], n: int) -> dict[str, Any]:
     """The same truth with a frame for each JSBSim step. Faults begin and end in the first step of a frame."""
     rate, faults = document.get("rate_hz", 100), []
     for fault in document.get("faults", []):
-        first_frame = {key: ceil(fault[key] * rate - 1e-9) for key in ("at_s", "end_s") if key in fault}
-        faults.append(fault | {key: ((frame - 1) * n + 1) / (rate * n) for key, frame in first_frame.items()})
+        frame = {key: ceil(fault[key] * rate - 1e-9) for key in ("at_s", "end_s") if key in fault and n > 1}
+        faults.append(fault | {key: ((k - 1) * n + 1) / (rate * n) for key, k in frame.items()})
     truth = {key: value for key, value in document.items() if key not in ("fdi", "control", "expect")}
     return truth | {"rate_hz": rate * n, "substeps": 1, "faults": faults}
 

@@ -146,7 +146,8 @@ class Isolation:
         self.forget = np.exp(-declaration.dt / declaration["forgetting_time_s"])
         self.shared = declaration.sharpen("shared_effectiveness")
         self.remembers = declaration.sharpen("memory")
-        self.abrupt = declaration["fault_profile"] == "abrupt" and declaration.sharpen("set_membership")
+        constant = declaration["fault_profile"] == "abrupt" and not declaration["pairs"]
+        self.narrows = constant and declaration.sharpen("set_membership")
         self.m = self._parity_directions(G_0)
         shape = len(self.of), bank.a.size, 4
         self.L, self.U = np.zeros(shape), np.zeros(shape)  # the fourth column is along the parity direction
@@ -315,7 +316,7 @@ class Isolation:
             one = self.is_position[row] or self.shared
             if one and (started or self.remembers) and not self.some_theta(row, of, frame):
                 excluded[row] = True
-            elif self.abrupt and started and not self.is_position[row]:
+            elif self.narrows and started and not self.is_position[row]:
                 excluded[row] = not self.narrow(row, of, frame)
         for row in range(len(self.of)):
             out = excluded[row] and by_worst_case

@@ -203,6 +203,16 @@ def within(ends: tuple[np.ndarray, np.ndarray], value: np.ndarray) -> np.ndarray
     return np.minimum(np.maximum(value, ends[0]), ends[1])
 
 
+def possible_servos(declaration: Declaration) -> tuple[Servos, np.ndarray, np.ndarray]:
+    """The four extremes of the actuators by the declared errors of bandwidth and rate limit, a row each; the
+    dead bands, rad, and the errors of the rate limits, a column for each surface."""
+    errors = declaration["bounds.actuators"]
+    each = [{**errors, **errors.get(s, {})} for s in declaration.aircraft.surfaces]
+    w, r, d = (np.array([of.get(key, 0.0) for of in each]) for key in ACTUATOR_ERRORS)
+    signs = np.array([*product((-1.0, 1.0), repeat=2)])
+    return Servos(declaration, 1.0 + signs[:, :1] * w, 1.0 + signs[:, 1:] * r), np.radians(d), r
+
+
 def servo_positions(
     declaration: Declaration, command: np.ndarray, start: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -211,19 +221,15 @@ def servo_positions(
 
     The ends of where a surface may be go by the farthest of all steps that errors of bandwidth and rate limit
     allow, to a target within the dead band of the command."""
-    errors, aircraft = declaration["bounds.actuators"], declaration.aircraft
-    each = [{**errors, **errors.get(s, {})} for s in aircraft.surfaces]
-    w, r, d = (np.array([of.get(key, 0.0) for of in each]) for key in ACTUATOR_ERRORS)
-    known, band, travel = Servos(declaration, 1.0 + 0.0 * w, 1.0 + 0.0 * r), np.radians(d), aircraft.travel
+    (possible, band, _), travel = possible_servos(declaration), declaration.aircraft.travel
+    known = Servos(declaration, 1.0 + 0.0 * band, 1.0 + 0.0 * band)
     u = command.copy()
     u[0] = start
     for j in range(1, len(command)):
         u[j] = known.moved(u[j - 1], command[j])
     du = np.radians(declaration["bounds.deflection_deg"]) + np.zeros_like(u)
-    if not (w + r + d).any():
+    if not declaration["bounds.actuators"]:
         return u, du
-    signs = np.array([*product((-1.0, 1.0), repeat=2)])
-    possible = Servos(declaration, 1.0 + signs[:, :1] * w, 1.0 + signs[:, 1:] * r)
     low, high = within(travel, command - band), within(travel, command + band)
     low[0], high[0] = within(travel, start - band), within(travel, start + band)
     for j in range(1, len(command)):

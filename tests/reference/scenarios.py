@@ -1,6 +1,7 @@
 """Scenarios to compare in: a covering array over what the diagnosis depends on, and over what it meets."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,10 @@ FAULTS = {
     "oscillation": {"type": "oscillatory", "amplitude_deg": 1.5, "frequency_rad_s": 6.0},
     "outside": {"type": "unanticipated", "Cm_alpha3": 10.0},
 }
+AT_ONCE = {"stuck", "hardover", "float"}
+SECOND: dict[str, Document] = {
+    "stuck": {"type": "stuck", "position_deg": -2.0}, "bias": {"type": "bias", "bias_deg": -1.5},
+}  # fmt: skip
 GYRO = {"noise_std_deg_s": 0.02, "bias_deg_s": 0.05, "quantum_deg_s": 0.001, "scale_error": 0.002}
 SENSORS: dict[str, Any] = {
     "ideal": "ideal",
@@ -98,6 +103,9 @@ DETECTORS: dict[str, Document] = {
     "statistical": {"statistical": {"misnaming": 0.01, "uncertainty_rad_s": 5.0}, "authority": "statistical"},
     "both": {"statistical": {"false_alarms_per_h": 10.0}, "authority": "worst-case"},
 }
+SLOWEST: dict[str, Document] = {
+    "default": {}, "quick": {"slowest_oscillation_rad_s": 12.0, "slowest_rate_deg_s": 2.0},
+}  # fmt: skip
 FACTORS = (
     Factor("aircraft", ("beaver", "beaver-split", "jsbsim:c172p")),
     Factor("rate", tuple(RATES)),
@@ -106,6 +114,7 @@ FACTORS = (
     Factor("fault_class", ("published", "all")),
     Factor("detector", tuple(DETECTORS), STILL | {"fault_class": frozenset({"published"})}),
     Factor("pairs", ("false", "true"), {"fault_class": frozenset({"all"})}),
+    Factor("slowest", tuple(SLOWEST), {"fault_class": frozenset({"all"})}),
     Factor("thresholds", ("interval", "published"), OURS),
     Factor("fault_profile", ("any", "abrupt")),
     *(Factor(name, tuple(levels), OURS if name == "sharpen" else {}) for name, levels in SECTIONS.items()),
@@ -115,13 +124,25 @@ FACTORS = (
     Factor("law", ("fault-tolerant", "nominal", "adaptive")),
     Factor("reference", tuple(REFERENCES)),
     Factor("fault", ("none", *FAULTS)),
-    Factor("course", ("abrupt", "ended"), {"fault": STRUCK}),
+    Factor("course", ("abrupt", "ended", "growing"), {"fault": STRUCK}),
     Factor("surface", ("first", "second", "third", "last"), {"fault": STRUCK - {"outside"}}),
+    Factor("second", ("none", *SECOND), {"pairs": frozenset({"true"}), "fault": STRUCK - {"outside"}}),
 )
 
 
+OF_ALL_TYPES = {
+    "scheme": ("adaptive-estimators",), "fault_class": ("all",), "fault_profile": ("any",),
+    "slowest": ("quick",), "fault": tuple(FAULTS), "turbulence": ("none", "light"),
+    "declared sensors": ("ideal", "gyros", "steady"), "design": ("nominal", "heavy"),
+    "poles": ("default",), "constant": ("default",), "coupling": ("default",),
+}  # fmt: skip
+
+
 def _forbidden(name: str, level: str, other: str, there: str) -> bool:
-    """What is refused: pairs with noise, air that moves about a derived aircraft, faults only ours have."""
+    """What is refused: pairs with noise, air that moves about a derived aircraft, faults only ours have; what
+    begins inside a frame, unless abrupt."""
+    if (name, level) == ("course", "growing"):
+        return there not in {"fault": FAULTS.keys() - AT_ONCE, "substeps": ("1",)}.get(other, (there,))
     if (name, level) == ("pairs", "true"):
         return there not in {"declared sensors": ("ideal",), "aircraft": ("beaver",)}.get(other, (there,))
     if (name, level) == ("fault_class", "all"):
@@ -131,12 +152,13 @@ def _forbidden(name: str, level: str, other: str, there: str) -> bool:
     return False
 
 
-def scenarios(seed: int) -> Iterator[Document]:
-    """One covering array after the other, without end."""
-    arrays = 0
+def scenarios(seed: int, of_all_types: bool = False) -> Iterator[Document]:
+    """One covering array after the other, without end; of_all_types: only flights that this class decides."""
+    arrays, kept = 0, OF_ALL_TYPES if of_all_types else {}
+    factors = [replace(one, levels=kept.get(one.name, one.levels)) for one in FACTORS]
     while True:
         rng = np.random.default_rng([seed, arrays])
-        for number, row in enumerate(CoveringArray(FACTORS, _forbidden, rng).rows()):
+        for number, row in enumerate(CoveringArray(factors, _forbidden, rng).rows()):
             yield document_of(row, rng, f"compared-{seed}-{arrays}-{number}")
         arrays += 1
 
@@ -152,7 +174,7 @@ def document_of(row: dict[str, str], rng: np.random.Generator, name: str) -> Doc
     }  # fmt: skip
     if row["scheme"] == "adaptive-estimators":
         fdi |= {"sensor_monitor": "never", "pairs": row.get("pairs") == "true"}
-        fdi |= DETECTORS[row.get("detector", "worst case")]
+        fdi |= DETECTORS[row.get("detector", "worst case")] | SLOWEST[row.get("slowest", "default")]
         fdi |= {"thresholds": row["thresholds"], **SECTIONS["sharpen"][row["sharpen"]]}
     moving = row["turbulence"] != "none"
     return {
@@ -185,7 +207,13 @@ def _faults(row: dict[str, str], rng: np.random.Generator, duration_s: float) ->
         ]
     if row["course"] == "ended":
         fault["end_s"] = at_s + 0.2 * duration_s
-    return [fault]
+    if row["course"] == "growing":
+        fault |= {"profile": "incipient", "kappa_per_s": 3.0}
+    if row.get("second", "none") == "none":
+        return [fault]
+    other = surfaces[(surfaces.index(fault["actuator"]) + 2) % 4]  # of the same plane
+    later = {"actuator": other, "at_s": at_s + 0.3 * duration_s}
+    return [fault, SECOND[row["second"]] | later]
 
 
 SURFACES = {

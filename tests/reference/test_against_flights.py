@@ -10,17 +10,30 @@ from reference.comparison import differences
 from reference.scenarios import scenarios
 from samples import samples
 
-SEED, FLIGHTS, PARTS = 1, samples(1000), 10  # by day one covering array of 124
+SEED, PARTS = 1, 10
+FLIGHTS = (
+    samples(1000),
+    samples(480),
+)  # by day one covering array of 120, and most of one of faults of all types
 DERIVES = "derive" in entries(SERVICES)  # without, no aircraft of the jsbsim package flies
 
 
 @cache
-def drawn():
-    return [*islice(scenarios(SEED), FLIGHTS)]
+def drawn(of_all_types):
+    return [*islice(scenarios(SEED, of_all_types), FLIGHTS[of_all_types])]
+
+
+def compare(drawn):
+    flown = [one for one in drawn if DERIVES or not one["aircraft"].startswith("jsbsim:")]
+    different = {one["name"]: found for one in flown if (found := differences(one))}
+    assert not different, "\n".join(f"{name}: {line}" for name, found in different.items() for line in found)
 
 
 @pytest.mark.parametrize("part", range(PARTS))
 def test_columns_alarm_and_names_are_those_of_the_pages(part):
-    flown = [one for one in drawn()[part::PARTS] if DERIVES or not one["aircraft"].startswith("jsbsim:")]
-    different = {one["name"]: found for one in flown if (found := differences(one))}
-    assert not different, "\n".join(f"{name}: {line}" for name, found in different.items() for line in found)
+    compare(drawn(False)[part::PARTS])
+
+
+@pytest.mark.parametrize("part", range(PARTS))
+def test_types_and_candidates_are_those_of_the_page(part):
+    compare(drawn(True)[part::PARTS])

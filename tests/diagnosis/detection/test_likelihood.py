@@ -1,10 +1,9 @@
 """The likelihood ratios against generalised least squares with the whole covariance, and their promises."""
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from innovations import block_of, bounded_all, by_onset, covariance, drawn, weigh_all, with_hypotheses
+from innovations import block_of, bounded_all, by_onset, with_hypotheses
 
 from beaver_ftc.diagnosis.detection import likelihood, whitening
 from beaver_ftc.diagnosis.detection.blocks import N_SLOTS, STEP_FAULT, restarting_slot
@@ -23,35 +22,6 @@ AXES = {  # drift, noise, what a drift keeps of itself in a frame
 def _block(case, *kinds, tolerance=()):
     drift, noise, kept = AXES[case]
     return with_hypotheses(block_of(drift, noise, jitter=0.05, keep=kept), *kinds, tolerance=tolerance)
-
-
-def _onsets(frames):
-    """By slot, the frame at which it last began anew: slot j at odd multiples of 2^j."""
-    starts = {}
-    for k in range(frames):
-        twos = N_SLOTS - 1 if k == 0 else (k & -k).bit_length() - 1
-        starts[min(twos, N_SLOTS - 1)] = k
-    return starts
-
-
-@pytest.mark.parametrize("case", AXES)
-@pytest.mark.parametrize("frames", [37, 64, 101])
-def test_evidence_and_information_of_every_onset_are_those_of_least_squares(case, frames):
-    rng = np.random.default_rng(frames)
-    block = _block(case, LOSS, STEP_FAULT, tolerance=(0.1, 0.2, 0.3))
-    n = int(block["n"])
-    inverse = np.linalg.inv(covariance(block, frames, DT))
-    signatures, regressors = rng.normal(size=(frames, 2, n)), rng.normal(size=(frames, 3, n))
-    nu = drawn(block, frames, DT, rng, start=1.0)
-    weigh_all(block, nu, signatures, regressors, DT)
-    for slot, onset in _onsets(frames).items():
-        for h in range(2):
-            s = np.where(np.arange(frames)[:, None] >= onset, signatures[:, h], 0.0).ravel()
-            information, correlation = by_onset(block, "D"), by_onset(block, "N")
-            assert information[slot, h] == pytest.approx(s @ inverse @ s, rel=1e-6)
-            assert correlation[slot, h] == pytest.approx(s @ inverse @ nu.ravel(), rel=1e-6, abs=1e-9)
-            overlap = [s @ inverse @ regressors[:, j].ravel() for j in range(3)]
-            assert by_onset(block, "R")[:3, slot, h] == pytest.approx(overlap, rel=1e-6, abs=1e-9)
 
 
 @settings(max_examples=samples(60))

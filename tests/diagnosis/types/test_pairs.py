@@ -3,14 +3,11 @@
 import numpy as np
 import pytest
 from design_plant import UNCERTAINTIES, DesignPlant
-from hypothesis import given, settings
 from hypothesis import strategies as st
-from test_fault_types import SURFACES, TYPES, shares, uncertainties
+from test_fault_types import SURFACES, TYPES
 
-from beaver_ftc.diagnosis.types import registry as types
 from beaver_ftc.diagnosis.types.findings import fault_finding_dict
 from flying import flown
-from samples import samples
 
 AILERON, ELEVATOR, RUDDER = range(3)
 kinds = st.sampled_from(list(TYPES))
@@ -31,45 +28,6 @@ def fly(seed, uncertainty, faults, frames=700, pairs=True):
         pairs=pairs,
     )
     return plant.fly(frames, uncertainty)
-
-
-def check(plant, faults):
-    """No surface named that is healthy, no type named or excluded wrongly."""
-    true = {
-        ("aileron", "elevator", "rudder")[s]: types.TYPE_NAMES[TYPES[kind][1]] for s, kind, _, _ in faults
-    }
-    for one in fault_finding_dict(plant.fdi, SURFACES)["faults"]:
-        if one["isolated"]:
-            assert one["isolated"] in true
-            assert one["isolation_type"] in (true[one["isolated"]], None)
-            assert true[one["isolated"]] in one["candidates"]
-
-
-@settings(max_examples=samples(60), deadline=None)
-@given(st.integers(0, 2**32), uncertainties, kinds, kinds, starts, starts, shares, shares)
-def test_ailerons_and_rudder(seed, uncertainty, kind, other, at, later, share, other_share):
-    faults = (AILERON, kind, at, share), (RUDDER, other, later, other_share)
-    plant = fly(seed, uncertainty, faults)
-    check(plant, faults)
-    for surface, one, _, _ in faults:
-        assert not plant.fdi["types"]["surface"][surface]["sets"]["excluded"][TYPES[one][1]]
-    assert not plant.fdi["types"]["pair"]["lateral_outside"]
-
-
-@settings(max_examples=samples(40), deadline=None)
-@given(st.integers(0, 2**32), uncertainties, kinds, kinds, starts, starts, shares, shares)
-def test_a_fault_in_each_plane(seed, uncertainty, kind, other, at, later, share, other_share):
-    faults = (ELEVATOR, kind, at, share), (RUDDER, other, later, other_share)
-    check(fly(seed, uncertainty, faults), faults)
-
-
-@settings(max_examples=samples(40), deadline=None)
-@given(st.integers(0, 2**32), uncertainties, kinds, st.integers(0, 2), starts, shares)
-def test_one_fault_is_not_taken_for_two(seed, uncertainty, kind, surface, at, share):
-    faults = ((surface, kind, at, share),)
-    plant = fly(seed, uncertainty, faults)
-    check(plant, faults)
-    assert len(fault_finding_dict(plant.fdi, SURFACES)["faults"]) <= 1
 
 
 def test_both_are_named_and_a_search_for_one_finds_neither():

@@ -12,7 +12,6 @@ from reference.declaration import POSITION, Declaration
 from reference.detection import Bank
 from reference.isolation import Effect, Frame, Isolation
 from reference.types import (
-    RateLimit,
     Rules,
     Seen,
     Surface,
@@ -22,8 +21,6 @@ from reference.types import (
 
 UNANTICIPATED, PITCH = "unanticipated", 1
 DECLARED = ("sensors", "actuators", "coefficients", "inertia", "deflection_deg", "turbulence")
-
-
 Withdrawn = tuple[str, str | None, int, int]  # surface, type, first and last frame
 
 
@@ -66,12 +63,6 @@ class Part(Surface):
         """Whether each type that must show itself would have done so."""
         return all(self.unhidden >= one.must_show * self.rules.half for one in self.left)
 
-    @property
-    def may_be_slow(self) -> bool:
-        """Whether a constant type may be a slow surface that has reached its command."""
-        slow = any(isinstance(one, RateLimit) for one in self.left)
-        return bool(self.constant) and slow and self.count < self.rules.half
-
     def see_offset(self, e: float, tolerance: float) -> bool:
         """The last frame says delta - u = e +- tolerance; whether that is possible."""
         seen = self.seen[-1]
@@ -96,7 +87,7 @@ class Part(Surface):
 
     def type_of_fault(self) -> Type | None:
         """The type, None while more than one fits or one may yet show itself."""
-        if self.count < self.rules.half or self.may_be_slow:
+        if self.count < self.rules.half:
             return None
         if self.rules.coarse:
             one = only(self.left)

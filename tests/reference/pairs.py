@@ -111,7 +111,7 @@ class Pairs(Naming):
         found = found if isinstance(found, Part) and found.constant else None
         if found:
             imitated = found.can_be_another(only(found.constant), False)
-            if found.count >= self.rules.half and found.waited and not (imitated or found.may_be_slow):
+            if found.count >= self.rules.half and found.waited and not imitated:
                 self.store(found)
         for part in self.pitch:
             kind = part.type_of_fault() if part is found else None

@@ -106,6 +106,8 @@ DETECTORS: dict[str, Document] = {
 SLOWEST: dict[str, Document] = {
     "default": {}, "quick": {"slowest_oscillation_rad_s": 12.0, "slowest_rate_deg_s": 2.0},
 }  # fmt: skip
+SINUSOID = {"amplitude_rad_s2": 0.02, "frequency_rad_s": 8.0}
+TRUTHS: dict[str, Document] = {"as modelled": {}, "errs": {"sinusoid": dict.fromkeys("pqr", SINUSOID)}}
 FACTORS = (
     Factor("aircraft", ("beaver", "beaver-split", "jsbsim:c172p")),
     Factor("rate", tuple(RATES)),
@@ -120,6 +122,7 @@ FACTORS = (
     *(Factor(name, tuple(levels), OURS if name == "sharpen" else {}) for name, levels in SECTIONS.items()),
     Factor("declared sensors", tuple(SENSORS)),
     Factor("true sensors", ("ideal", "as declared")),
+    Factor("truth", tuple(TRUTHS)),
     Factor("turbulence", ("none", "light", "moderate")),
     Factor("law", ("fault-tolerant", "nominal", "adaptive")),
     Factor("reference", tuple(REFERENCES)),
@@ -148,7 +151,7 @@ def _forbidden(name: str, level: str, other: str, there: str) -> bool:
     if (name, level) == ("fault_class", "all"):
         return other == "scheme" and there != "adaptive-estimators"
     if (name, level) == ("aircraft", "jsbsim:c172p"):
-        return (other == "turbulence" and there != "none") or (other, there) == ("fault", "outside")
+        return (other == "turbulence" and there != "none") or there in ("outside", "errs")
     return False
 
 
@@ -184,7 +187,7 @@ def document_of(row: dict[str, str], rng: np.random.Generator, name: str) -> Doc
         "sensors": SENSORS[row["declared sensors"]] if row["true sensors"] == "as declared" else "ideal",
         "actuators": _actuators(row), "design_model": SECTIONS["design"][row["design"]], "fdi": fdi,
         "environment": {"turbulence": "dryden", "severity": row["turbulence"]} if moving else {},
-        "faults": _faults(row, rng, duration_s),
+        "uncertainty": TRUTHS[row["truth"]], "faults": _faults(row, rng, duration_s),
     }  # fmt: skip
 
 

@@ -40,6 +40,8 @@ from beaver_ftc.scenario.declared import Declared, SensorErrors
 from beaver_ftc.scenario.diagnosis import MAX_POLES, FdiConfig
 from beaver_ftc.scenario.sensors import NOISE_LIMIT_SIGMA
 
+# A residual below this share of its threshold may be rounding, in which processors differ.
+ROUNDING_SHARE = 1e-6
 POLE_DELAYS_S = (0.1, 0.5, 2.0)  # detection delays for which `poles_for_delays` chooses a pole each
 
 
@@ -166,8 +168,9 @@ def filter_share(bank, m, i):
 
 @kernel
 def nearest_filter(bank, i):
-    """The filter whose |E| / T is largest on axis i; if there is an alarm on this axis, it is of this one."""
-    nearest, largest = 0, 0.0
+    """The filter whose |E| / T is largest on axis i; if there is an alarm on this axis, it is of this one.
+    While no share is above ROUNDING_SHARE, it is filter 0."""
+    nearest, largest = 0, ROUNDING_SHARE
     for m in range(bank.config.n_filters):
         share = filter_share(bank, m, i)
         if share > largest:
@@ -177,7 +180,7 @@ def nearest_filter(bank, i):
 
 @kernel
 def bank_share(bank):
-    """The largest |E| / T in the bank, over filters and axes."""
+    """The largest |E| / T in the bank, over filters and axes; of filter 0 if none is above ROUNDING_SHARE."""
     largest = 0.0
     for i in range(3):
         largest = max(largest, filter_share(bank, nearest_filter(bank, i), i))

@@ -17,8 +17,8 @@ from kept import Fields, in_short, of_record
 _ALL = yaml.safe_load_all((Path(__file__).parent / "data" / "short_flights.yaml").read_text())
 _DERIVES = "derive" in entries(SERVICES)  # without, no aircraft of the jsbsim package flies
 SCENARIOS = [one for one in _ALL if _DERIVES or not str(one.get("aircraft")).startswith("jsbsim:")]
-# Where JSBSim has its numbers: compiled code reads them there. Rounding decides whether a regressor is 0, and so
-# how often P forgets.
+# Where JSBSim has its numbers: compiled code reads them there. Rounding decides whether a regressor is 0, and
+# so how often P forgets.
 OF_THE_MACHINE = (".native", ".executive", ".run", "getter", "setter", "pointer", "pointers", "estimator.P")
 
 

@@ -24,7 +24,7 @@ for name in sorted(sys.modules):
 """
 # What takes a process a tenth of a second or so to import, or belongs to a flight.
 HEAVY = {"beaver_ftc.scenario.schema", "jsbsim", "matplotlib", "numba", "numpy", "pandas", "pyarrow", "scipy"}
-BAR = 215
+BAR = 211
 
 
 def modules(code, *arguments, folder=None):

@@ -68,8 +68,9 @@ class Bank:
         return int(beyond.argmax()) if beyond.any() else None
 
     def nearest_to_alarm(self) -> tuple[np.ndarray, np.ndarray]:
-        """(frames, 3) each: residual and threshold of the filter with the largest |E_i| / T_i."""
+        """(frames, 3) each: residual and threshold of the filter with the largest |E_i| / T_i; of the first
+        filter if none is above a millionth."""
         with np.errstate(divide="ignore", invalid="ignore"):
             share = np.where(self.T > 0.0, np.abs(self.E) / self.T, 0.0)
-        m = share.argmax(axis=1)[:, None, :]
+        m = np.where(share > 1e-6, share, 0.0).argmax(axis=1)[:, None, :]
         return np.take_along_axis(self.E, m, 1)[:, 0], np.take_along_axis(self.T, m, 1)[:, 0]

@@ -70,9 +70,16 @@ def test_what_is_taken_of_a_verdict(verdict):
     assert (found.isolation.fault, found.isolation.estimate) == (verdict.isolated, verdict.estimate)
 
 
-def test_the_law_is_given_the_effectiveness_that_a_detector_answers():
-    log = flown(Answers(Verdict(True, "q", "elevator", effectiveness=(1, 0.5, 0.25, 0)))).log
-    assert [log[f"{s}_effectiveness_estimate"].iloc[-1] for s in SURFACES] == [1.0, 0.5, 0.25, 0.0]
+@pytest.mark.parametrize(
+    ("kind", "size", "given", "expected"),
+    [
+        (None, None, (1, 0.5, 0.25, 0), [1.0, 0.5, 0.25, 0.0]),
+        ("stuck", 0.1, None, [1.0] * 4),  # the size is an angle
+    ],
+)
+def test_the_law_is_given_the_effectiveness_that_a_detector_answers(kind, size, given, expected):
+    log = flown(Answers(Verdict(True, "q", "elevator", kind, size, effectiveness=given))).log
+    assert [log[f"{s}_effectiveness_estimate"].iloc[-1] for s in SURFACES] == expected
 
 
 @pytest.mark.parametrize(

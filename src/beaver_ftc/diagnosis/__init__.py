@@ -51,7 +51,8 @@ class Measured(NamedTuple):
 
     - `acceleration` (3,) rad/s²: angular acceleration f + G u of the design model. With x_before, the `x` of
       the previous frame, the innovation is (x - x_before) / dt - acceleration.
-    - `contribution` (3, surfaces) rad/s²: the part G u of each commanded surface.
+    - `contribution` (3, surfaces) rad/s²: the part G_s u_s of each surface, at the deflection of a healthy
+      one.
     - `eta_bar` (3,) rad/s²: declared bound on the error of `acceleration`.
 
     The last three fields are readings at `t_s`. They are NaN if no such instrument is read, as in some
@@ -77,11 +78,12 @@ class Verdict(NamedTuple):
     """The result of a detector up to the present frame. The loop keeps the first alarm.
 
     - `detected`: True if the detector raises the alarm.
-    - `axis`: axis of the alarm: `p`, `q` or `r`; None counts as `p`.
+    - `axis`: axis of the alarm: `p`, `q` or `r`; None counts as `p`. The first verdict with `detected`
+      decides.
     - `isolated`: name of the faulty surface, or `unanticipated`; None if no fault is isolated.
     - `type`: fault type of the isolated fault.
     - `estimate`: estimated size of the fault. The size of a loss of effectiveness is theta, from -1 to 0. The
-      size of any other fault is an angle, rad.
+      size of any other fault is an angle, rad, which the laws do not use.
     - `effectiveness` (surfaces,): estimated effectiveness of every surface, 1 if it is healthy. The adaptive
       laws use it. None if the detector does not estimate it.
     - `statistic`: number that exceeds 1 when the alarm is raised. Compute this number in every frame, also
@@ -103,7 +105,8 @@ class Verdict(NamedTuple):
 class Detector(Protocol):
     """A diagnosis scheme. Write a class with the methods `reset` and `step`.
 
-    The class takes no arguments. `beaver-ftc list` prints the first line of its docstring as a description.
+    Its constructor takes no arguments. `beaver-ftc list` prints the first line of its docstring as a
+    description.
     """
 
     def reset(self, context: "Context") -> None:

@@ -167,9 +167,11 @@ class PluginFrame:
         if not isinstance(verdict.isolated, str | None) or verdict.isolated not in self._isolated:
             allowed = ", ".join(str(key) for key in self._isolated)
             self._blame(name, f"verdict.isolated is {verdict.isolated!r}, allowed: {allowed}")
-        estimate = 0.0 if verdict.estimate is None else verdict.estimate
+        # The size of a type that is no loss is an angle, which says nothing of the effectiveness.
+        is_loss = verdict.estimate is not None and verdict.type in (None, "loss_of_effectiveness")
+        theta = verdict.estimate if is_loss else 0.0
         taken["detected"], taken["axis"] = bool(verdict.detected), _AXES[verdict.axis]
-        taken["isolated"], taken["theta"] = self._isolated[verdict.isolated], estimate
+        taken["isolated"], taken["theta"] = self._isolated[verdict.isolated], theta
         taken["has_effectiveness"] = verdict.effectiveness is not None
         if verdict.effectiveness is not None:
             taken["effectiveness"] = self._a_number_each(name, "verdict.effectiveness", verdict.effectiveness)

@@ -4,7 +4,6 @@ quantity."""
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -13,7 +12,16 @@ from beaver_ftc_logs.readers import LAST_PART_FACTOR, PART_OVERLAP_SHARE, check_
 from beaver_ftc_logs.readers.cells import TableCells, join_blocks
 from beaver_ftc_logs.readers.parquet_table import BATCH_ROWS, MAX_ROWS, ParquetTable
 from beaver_ftc_logs.readers.text import TextTable, unreadable_error
-from beaver_ftc_logs.recording import Column, Floats, RecordedFlight, TimeSource, Wanted, nearest_names_text
+from beaver_ftc_logs.recording import (
+    Column,
+    Floats,
+    Ints,
+    Mask,
+    RecordedFlight,
+    TimeSource,
+    Wanted,
+    nearest_names_text,
+)
 from beaver_ftc_logs.refusals import refusal
 from beaver_ftc_logs.units import TIME_UNITS
 
@@ -29,8 +37,8 @@ def read_parts(
     part_rows: int | None = None,
 ) -> Iterator[RecordedFlight]:
     """The flight in a table. A table of more than LAST_PART_FACTOR times part_rows rows is returned in parts
-    of part_rows rows, so that memory does not grow with the file; the last part may have up to this many
-    times as many. The parts are numbered, and each begins with the end of the part before.
+    of part_rows rows, so that memory does not grow with the file; only the last part may be longer, up to
+    LAST_PART_FACTOR times part_rows. The parts are numbered, and each begins with the end of the part before.
 
     Cells without a number, and columns that are not read, are nan. time: column of the time and its unit,
     `t_s` in s if None. columns: the columns that are read, all if None. part_rows: if None, the table is one
@@ -47,24 +55,25 @@ def read_parts(
         numbers = table.whole(cells)
         t_s = numbers.pop(name) * TIME_UNITS[unit]
         kept, left_out = _timed_rows(path, name, t_s, cells)
+        check_time(path, t_s[kept], name, cells.n_rows_before + 1 + np.flatnonzero(kept))
         t_s = t_s[kept]
-        check_time(path, t_s, name, cells.n_rows_before)
         notes = cells.notes()
         read = {key: Column(t_s, values[kept], notes.get(key, "")) for key, values in numbers.items()}
         title = f"{path.stem}-part-{part}" if has_more or part > 1 else path.stem
         yield RecordedFlight(title, read, notes=(*table.remarks(cells), *left_out))
 
 
-def _timed_rows(path: Path, time: str, t_s: Floats, cells: TableCells) -> tuple[Any, list[str]]:
-    """The rows whose time is a number, and a line on the others. Raises BadInput if these are more than half.
-    time: name of the column."""
-    n_bad = int(np.isnan(t_s).sum())
+def _timed_rows(path: Path, time: str, t_s: Floats, cells: TableCells) -> tuple[Mask, list[str]]:
+    """Whether the time of each row is a finite number (n,), and a line on the others. Raises BadInput if
+    these are more than half. time: name of the column."""
+    kept = np.isfinite(t_s)
+    n_bad = int((~kept).sum())
     if not n_bad:
-        return slice(None), []
+        return kept, []
     if n_bad > len(t_s) // 2:
         reason = f"{n_bad} of {len(t_s)} rows hold no number{text_of_column_phrase(cells, time)}"
         raise refusal(path, f"{time}: {reason}", "increasing time")
-    return np.isfinite(t_s), [f"{time}: rows without a number, left out: {n_bad} of {len(t_s)}"]
+    return kept, [f"{time}: rows without a number, left out: {n_bad} of {len(t_s)}"]
 
 
 def text_of_column_phrase(cells: TableCells, name: str) -> str:
@@ -91,14 +100,14 @@ def first_cells_of_column(path: Path, name: str) -> TableCells:
     return next(_Table(path).parts([name], BATCH_ROWS))[0]
 
 
-def check_time(path: Path, t_s: Floats, time: str = TIME_COLUMN, n_rows_before: int = 0) -> None:
-    """Raise BadInput unless the stamps are finite and increase. n_rows_before: rows of the table before the
-    first."""
+def check_time(path: Path, t_s: Floats, time: str = TIME_COLUMN, rows: Ints | None = None) -> None:
+    """Raise BadInput unless the stamps are finite and increase. rows (n,): numbers of their rows in the
+    table, from 1; 1 to n if None."""
     if len(t_s) < 2:
         raise refusal(path, f"has {len(t_s)} rows", "at least 2")
     wrong = np.flatnonzero(~np.isfinite(t_s) | (np.diff(t_s, prepend=-np.inf) <= 0))
     if wrong.size:
-        row = n_rows_before + int(wrong[0]) + 1
+        row = wrong[0] + 1 if rows is None else rows[wrong[0]]
         raise refusal(path, f"{time}: row {row}: time does not increase", "increasing seconds")
 
 
@@ -144,7 +153,7 @@ class _Table:
         self, blocks: Iterator[TableCells], part_rows: int | None
     ) -> Iterator[tuple[TableCells, bool]]:
         """Yield the table in parts that overlap, and whether further parts follow; in one part if part_rows
-        is None. held: blocks that are not yet part of a complete part.
+        is None. held: the blocks of the next part so far, which begin with the end of the part before.
         """
         held: list[TableCells] = []
         with _read_errors(self._path):
@@ -156,6 +165,7 @@ class _Table:
                     raise BadInput(f"{self._path}: {reason}")
                 while part_rows is not None and n_held > LAST_PART_FACTOR * part_rows:
                     joined = join_blocks(held)
+                    self._file_table.check_broken_lines(self._path, joined)
                     remainder = joined.select_rows(part_rows - round(PART_OVERLAP_SHARE * part_rows))
                     held = [remainder]
                     n_held = remainder.n_rows

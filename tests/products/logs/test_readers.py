@@ -16,6 +16,7 @@ from products.logs import synthetic
     [
         ("time,p\n1,2\n2,3\n", "no column t_s"),
         ("t_s,p\n1,2\n1,3\n", "t_s: row 2: time does not increase"),
+        ("t_s,p\n1,2\nx,2\n1,3\n", "t_s: row 3: time does not increase"),  # the row without a time counts
         ("t_s,p\n1,2\n", "has 1 rows, allowed: at least 2"),
         ("t_s,p\n1,2,3\n", "is no table that can be read"),
         ("", "is no table that can be read"),

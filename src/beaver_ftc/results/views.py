@@ -145,12 +145,12 @@ def _mean_airspeed_traces(within_mps: float | None) -> list[tuple[Any, ...]]:
 
 
 def surfaces_by_kind(names: Names) -> dict[str, list[str]]:
-    """Names of surfaces by kind, in their order: `left_inboard_elevator`, `elevator_2` are elevators."""
+    """Names of surfaces by kind, in their order. The kind is the last word that is no side and no number:
+    `left_inboard_elevator`, `elevator_2` and `outboard_elevator_left` are elevators."""
     by_kind: dict[str, list[str]] = {}
     for name in names:
-        words = name.split("_")
-        is_one_of_many = words[-1].isdigit() or words[-1] in SIDES
-        by_kind.setdefault(words[0 if is_one_of_many else -1], []).append(name)
+        kinds = [word for word in name.split("_") if not word.isdigit() and word not in SIDES]
+        by_kind.setdefault(kinds[-1] if kinds else name, []).append(name)
     return by_kind
 
 

@@ -29,7 +29,7 @@ def of_sweep(
     """The first `most` flights of a sweep file; None is all. Raises BadInput for a wrong file, or one whose
     base has `changes`.
 
-    draw: 0 flies with the seed of the file; each other number flies with another seed, and so other flights.
+    draw: 0 keeps the seed of the file; each other number adds DRAW times itself to it: other flights.
     """
     from beaver_ftc.scenario.sweeps import load_sweep
     from beaver_ftc.studies.sweep.one_flight import scenario_of
@@ -60,8 +60,8 @@ def set_names() -> list[str]:
 def of_set(name: str, most: int | None = None, draw: int = 0) -> list[SetFlight]:
     """The flights of a standard set: the first `most` of each of its sweeps. draw: as in `of_sweep`. Raises
     BadInput for an unknown set."""
-    folder = benchmark_folder() / name
-    if not folder.is_dir():
-        allowed = ", ".join([*set_names(), *(CALIBRATION + grade for grade in FLIGHT_GRADES)])
-        raise BadInput(f"no benchmark set {name!r}, allowed: {allowed}")
-    return [case for path in sorted(folder.glob("*.yaml")) for case in of_sweep(path, name, most, draw)]
+    allowed = [*set_names(), *(CALIBRATION + grade for grade in FLIGHT_GRADES)]
+    if name not in allowed:
+        raise BadInput(f"no benchmark set {name!r}, allowed: {', '.join(allowed)}")
+    sweeps = sorted((benchmark_folder() / name).glob("*.yaml"))
+    return [case for path in sweeps for case in of_sweep(path, name, most, draw)]

@@ -52,7 +52,7 @@ ESTIMATOR_RECORD = record(
     # by likelihood ratios; unlikely: in this frame, of a position by parity views
     confirmed=int, weak=int, unlikely=int,
     # R_pos: as Omega, of the positive part of Z; B, B_lag: rad/s
-    # effect: of the frame; mean_effect: of a block of frames (examination.py)
+    # effect: of the frame; mean_effect: of a block of frames (frame_blocks.py)
     Om=3, R_pos=3, B=3, B_lag=3, theta=3, P=3, effect=EFFECT_RECORD,
     mean_effect=EFFECT_RECORD,
     # In the last frame: the largest distance from neutral that the surface's mean position can have had, rad;

@@ -23,7 +23,7 @@ from beaver_ftc.diagnosis.detection import fdae, filters
 from beaver_ftc.diagnosis.monitors import engine_monitor, sensor_monitor
 from beaver_ftc.diagnosis.schemes.statistical_frame import update_tests
 from beaver_ftc.diagnosis.state import STATISTICAL_DETECTOR, UNANTICIPATED, WORST_CASE_DETECTOR, YAW
-from beaver_ftc.diagnosis.types import blocks, examination, modes, pairs, verdict
+from beaver_ftc.diagnosis.types import examination, frame_blocks, modes, pairs, verdict
 
 
 @kernel
@@ -159,7 +159,7 @@ def begin_types(fdi):
 @apart
 def record_orders(fdi, prediction):
     """Record what each surface was commanded in the elapsed frame."""
-    blocks.record_commands(fdi.types, prediction.commanded, prediction.means)
+    frame_blocks.record_commands(fdi.types, prediction.commanded, prediction.means)
 
 
 @apart

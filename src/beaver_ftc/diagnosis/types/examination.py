@@ -4,9 +4,9 @@ In each frame: where was each surface, and was anything wrong? A frame is judged
 of several JSBSim steps, a fault may begin or end within the frame, which then shows only a part of the fault.
 Such a frame, next to a healthy one, is skipped.
 
-Where the noise of a gyro makes single frames uninformative, frames are examined in blocks (blocks.py), and
-"frame" below means a block. To the types a block is like a frame of several JSBSim steps: a block next to a
-healthy one is skipped.
+Where the noise of a gyro makes single frames uninformative, frames are examined in blocks (frame_blocks.py),
+and "frame" below means a block. To the types a block is like a frame of several JSBSim steps: a block next to
+a healthy one is skipped.
 
 types: of `fault_types_dtype`. est: the estimators of the isolation; the layout has their numbers. bound: of
 `bound_dtype`. Other symbols: types/__init__.py.
@@ -18,7 +18,7 @@ from beaver_ftc.diagnosis.types import (
     GIVE_UP,
     REST_EXCLUDES_TYPE,
     REST_POSITION_IS_PARAMETER,
-    blocks,
+    frame_blocks,
     intersect_set,
     put_set,
     release,
@@ -133,7 +133,7 @@ def observe_frame(types, layout, est, nu, bound):
     """Observe the elapsed frame, or the block that it completes, and judge the one before."""
     if types.config.frames_per_block == 1:
         observe_surfaces(types, layout, est, nu, bound.nu_max)
-    elif blocks.extend_block(types, layout, est, nu, bound):
+    elif frame_blocks.extend_block(types, layout, est, nu, bound):
         observe_surfaces(types, layout, est, types.block.nu, types.block.nu_bound)
     else:
         return

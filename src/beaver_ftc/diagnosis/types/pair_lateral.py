@@ -21,8 +21,8 @@ from beaver_ftc.diagnosis.types.verdict import can_be_faulty, update_status
 
 @kernel
 def locate_lateral(types, layout, est, nu, nu_max):
-    """Find where ailerons and rudder were in the elapsed frame; `lateral_outside` if one was nowhere within
-    its reach."""
+    """Find where ailerons and rudder were in the elapsed frame; set `lateral_outside` for good if one was
+    nowhere within its reach."""
     a, r = layout.main[ROLL], layout.main[YAW]
     for s, s_other in ((a, r), (r, a)):
         eff, eff_other = est[layout.position[s]].effect, est[layout.position[s_other]].effect
@@ -52,12 +52,12 @@ def locate_one(srf, eff, eff_other, nu, nu_max):
 @kernel
 def isolate_lateral(types, layout, t):
     """Set the isolation of the surfaces of roll and yaw, at t s; returns whether the fault of this plane is
-    outside the class: neither alone can be faulty (`both`), and both together are refuted.
+    outside the class: neither can be the only faulty one (`both`), and both together are refuted.
 
         isolated    a surface, if the other alone cannot be faulty
         none        before the plane's alarm; and if neither alone can be faulty, but both together are
-                    refuted (by deflections out of reach, or since all types of one are excluded), or a type
-                    that has to show itself has not
+                    refuted (by deflections out of reach, or since all types of one are excluded), or one of
+                    them has no type left that has shown itself or need not (`explains_flight`)
     """
     roller, yawer = types.surface[layout.main[ROLL]], types.surface[layout.main[YAW]]
     both = not can_be_faulty(roller) and not can_be_faulty(yawer)

@@ -6,11 +6,11 @@ p, and the declared actuators bound it. So the positions that past releases can 
 whose ends are advanced exactly. A type that no longer holds the surface is excluded only if no such return
 explains the frame either.
 
-*Two intervals.* There is one of earlier and one of later releases. Nothing is observed before the alarm, so a
-release may have happened before it. Each frame in which something is wrong excludes some releases. After a
-release a type does not hold the surface again until the surface has been observed healthy. In a block of
-frames the release may happen at any instant of the block: at each instant the surface is where it was held,
-or where the actuator has moved it from there.
+*Two intervals.* There is one of later releases and, where the parameter is the position (*Sets*), one of
+earlier ones. Nothing is observed before the alarm, so a release may have happened before it. Each frame in
+which something is wrong excludes some releases. After a release a type does not hold the surface again until
+the surface has been observed healthy. In a block of frames the release may happen at any instant of the
+block: at each instant the surface is where it was held, or where the actuator has moved it from there.
 
 *Mean of a frame.* A frame shows the mean of a moving position p, weighted by the effectiveness G at each
 instant. This mean differs from the plain mean by the covariance of G and p, over the mean of G, so by no more
@@ -52,7 +52,7 @@ def set_return(rel, b, h, lo, hi):
 
 @kernel
 def forget_return(rel, b, h):
-    """Make the interval of slot b empty: no release of this type is possible."""
+    """Make the interval of slot b empty: no release of this type in this slot is possible."""
     rel.back_lo[b, h], rel.back_hi[b, h] = EMPTY_SET
 
 
@@ -81,12 +81,12 @@ def is_position(srf, h):
 
 @kernel
 def simulate_return(c, srf, p0, end, anywhere=False):
-    """Simulate the judged frame of a surface released at p0 rad. Returns, in rad, the mean of p over the
-    frame, p at its end, and kappa (p_max - p_min), by which the mean may be off.
+    """Simulate the judged frame of a surface on its return, at p0 rad as the frame begins. Returns, in rad,
+    the mean of p over the frame, p at its end, and kappa (p_max - p_min), by which the mean may be off.
 
     p <- f(p): one step of the actuator towards u; of the declared actuators, the one that takes the surface
-    farthest to one side, end 1 (up) or -1 (down). The release is at the beginning of the frame. If it may be
-    `anywhere` in it, p0 is at every step a possible position, too: p <- max(p, p0) for end 1, min for end -1.
+    farthest to one side, end 1 (up) or -1 (down). If the release may be `anywhere` in the frame, p0 is at
+    every step a possible position, too: p <- max(p, p0) for end 1, min for end -1.
     """
     act = srf.actuator
     total, p, p_min, p_max = 0.0, p0, p0, p0
@@ -146,7 +146,8 @@ def narrow_return(c, srf, b, h):
         lo <- lo + max(judged.lo - low - tol, 0),    hi <- hi - max(high - tol - judged.hi, 0)
 
     The cut needs an actuator without declared errors: the mean over the frame then rises with where the
-    return began, and by no more than that. A return that has ended by now (`healthy`) explains nothing wrong.
+    return began, and by no more than that. A return that is over (`healthy`) cannot be why the frame is
+    anomalous.
     """
     judged, lo, hi = srf.judged, srf.release.back_lo[b, h], srf.release.back_hi[b, h]
     (low, high), tols, _ = simulate_ends(c, srf, lo, hi)

@@ -71,7 +71,7 @@ def explains_flight(srf):
 @kernel
 def would_have_shown(c, srf):
     """Whether each type that must show itself is excluded, or has been waited for: SHOW_HALF_CYCLES
-    half-cycles of anomalous frames in which no stop could hide it (`n_unhidden`)."""
+    half-cycles of anomalous frames since a stop could last hide it (`n_unhidden`)."""
     for h in range(N_TYPES):
         if type_remains(srf, h) and srf.evidence.n_unhidden < SHOW_HALF_CYCLES[h] * c.half_frames:
             return False
@@ -93,7 +93,7 @@ def sole_type(srf, mask):
 
 @kernel
 def sole_shown_type(srf, mask):
-    """The sole type of a mask if it is shown, else TYPE_UNDECIDED."""
+    """The sole type of a mask, of several of one name the first, if it is shown; else TYPE_UNDECIDED."""
     kind = sole_type(srf, mask)
     return kind if kind >= 0 and has_shown(kind, srf, kind) else TYPE_UNDECIDED
 
@@ -128,19 +128,20 @@ def can_be_another(srf, apparent, with_dependent):
 
 @kernel
 def type_on_surface(c, srf):
-    """The type of the fault on a surface, taken to be at fault, after half a cycle of anomalous frames in
-    which it is not hidden; TYPE_UNDECIDED while more than one fits or one may yet show itself.
+    """The type of the fault on a surface, taken to be at fault, after half a cycle of anomalous frames,
+    unless a hidden type may explain it (`may_be_hidden`); TYPE_UNDECIDED while more than one fits or one may
+    yet show itself.
 
         errors of effects (has_eG)   the sole type, once it is shown
         a constant type remains      the sole constant type, once those that must show would have, unless it
                                      can be another
-        no constant type remains     the sole varying type that need not show itself, at the same time, unless
-                                     another can look like it; if there is none, the sole one that must and
-                                     has
+        no constant type remains     the sole varying type that need not show itself, once those that must
+                                     would have, unless another can look like it; if there is none, the sole
+                                     one that must and has
     """
     if srf.evidence.n_anomalous < c.half_frames or may_be_hidden(c, srf):
         return TYPE_UNDECIDED
-    if c.has_eG:  # in coarse sets a constant proves nothing
+    if c.has_eG:  # a set is wide then: that a constant type remains does not show that it is constant
         return sole_shown_type(srf, ALL)
     shown = would_have_shown(c, srf)
     if constant_remains(srf):

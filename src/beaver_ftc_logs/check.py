@@ -64,7 +64,7 @@ def _check_recording(log: RecordedFlight, vehicle: Vehicle) -> tuple[bool, list[
 
 def _compare_angles(log: RecordedFlight, vehicle: Vehicle) -> list[str]:
     """A line for each pair of rate and angle, both in SI, whether they agree; or one line with the reason why
-    they cannot be compared."""
+    the roll rate cannot be compared: pitch and yaw are not compared then either."""
     columns = convert_to_si(log, vehicle).columns
     angles = named_angles(columns, vehicle)
     if angles[0] is None:

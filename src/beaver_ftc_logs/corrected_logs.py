@@ -15,10 +15,10 @@ from beaver_ftc_logs.vehicle import Vehicle
 class CorrectedLog(NamedTuple):
     """A log after one correction.
 
-    correction_text: words for the correction. samples: the corrected log. log_jacobian: log |a| if a rate was
-    multiplied by a. Likelihoods are compared for the rates as they were logged, and the density of these is
-    |a| times that of the corrected rates. scaled_signal: the signal that was multiplied; empty for another
-    correction.
+    correction_text: words for the correction. samples: the corrected log. log_jacobian: log |a| a sample if a
+    rate was multiplied by a, else 0. Likelihoods are compared for the rates as they were logged, and the
+    density of these is |a| times that of the corrected rates. scaled_signal: the signal that was multiplied;
+    empty for another correction.
     """
 
     correction_text: str
@@ -30,7 +30,7 @@ class CorrectedLog(NamedTuple):
 def corrected_logs(samples: Samples, vehicle: Vehicle, unknown: Collection[str]) -> Iterator[CorrectedLog]:
     """The log with two commands or two rates exchanged, or one rate or signal with another sign or unit. A
     rate that the attitude confirms is not changed. unknown: surfaces whose effect the model does not know;
-    the log shows nothing about their commands, so these are not exchanged."""
+    no likelihood depends on their commands, so these are not exchanged."""
     surfaces = list(vehicle.surfaces)
     doubtful = [name for name in vehicle.rate_columns if name not in samples.confirmed_rates]
     for i, j in combinations([s for s, name in enumerate(surfaces) if name not in unknown], 2):

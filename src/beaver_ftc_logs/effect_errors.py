@@ -1,7 +1,8 @@
 """How well a fit knows the effect of each group of surfaces on the rates.
 
 G, L            number of groups; of past samples of the commands
-Z               regressors of the fit (n, m); those of the groups are the last G L columns
+Z               regressors of the fit (n, m), each row times the weight of its flight; those of the groups
+                are the last G L columns
 B               response of the rates to the commands of the groups (G, L, 3), rad/s
 W               whitening matrix (3, 3): W W' is the inverse of the covariance of the noise
 """
@@ -16,9 +17,9 @@ from beaver_ftc_logs.orders import stack_data
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
 
 RANK_TOLERANCE = 1e-9  # an eigenvalue that is smaller, over the largest, is rounding
-# Limits of the power of a group's effect, in variances of the noise in a sample. A smaller power is no
-# motion. A larger one counts as the cap: the part of it that may remain, a fiftieth (`trust`), is 0.25, the
-# square of half a standard deviation.
+# Limits of the power of a group's effect, in variances of the noise in a sample. Below the first, the group
+# did not move. Above the second, the second counts: at the limit of the share, 0.98 (`trust`), the
+# unexplained part is then 12.5 / 50 = 0.25, the square of half a standard deviation.
 _MIN_EFFECT_POWER = 1e-6
 _EFFECT_POWER_CAP = 12.5
 
@@ -26,10 +27,11 @@ _EFFECT_POWER_CAP = 12.5
 def tied_shares(parts: Parts, model: Model) -> Floats:
     """Share of the effect of each group on the rates that the other columns of the fit explain, (G,):
 
-        f = U_g B_g W less its mean,   u = f - Z b,   share = max(1 - mean |u|^2 / min(mean |f|^2, cap), 0)
+        f = U_g B_g W less its mean,   u = f - Z_o b,   share = max(1 - mean |u|^2 / min(mean |f|^2, cap), 0)
 
     U_g (n, L): columns of the group in the regressors; f, u (n, 3): its effect in standard deviations of the
-    noise, and the part that the other columns Z of the fit do not explain. cap: _EFFECT_POWER_CAP.
+    noise, and the part that Z_o, the other columns of Z, do not explain; b: least squares of f on Z_o. cap:
+    _EFFECT_POWER_CAP.
 
     If the share is near 1, the law ties the group to the quantities that it controls, and its effect is not
     identifiable. The share is 1 if mean |f|^2 is at most _MIN_EFFECT_POWER: the group never moved. If the
@@ -59,9 +61,9 @@ def group_gain_sd(fit: Regression, model: Model) -> Floats:
         z (L, 3)    coefficients in their standard errors
 
     The gain is that of the response summed over the lags, with the variance (b^2).v / |b|^4. With
-    `other_laws`, it is the factor of the whole response, with the variance 1 / (sum over the axes of z' C^-1
-    z): if the past explains the slow effect of a surface, as alpha does for an elevator, the sum over the
-    lags is not known, but the factor is.
+    `other_laws`, it is the factor of the whole response, with the variance 1 / (sum over the axes of z' C^+
+    z), C^+ the pseudo-inverse: if the past explains the slow effect of a surface, as alpha does for an
+    elevator, the sum over the lags is not known, but the factor is.
     """
     G = len(model.groups)
     L = model.lags

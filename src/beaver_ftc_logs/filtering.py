@@ -15,7 +15,7 @@ Under hypothesis h, with effectiveness a_h of the groups, the part of the rates 
     nu              degrees of freedom of the t distribution of the noise
     r               running scale of the variance of the noise
     q               variance of a sample over that of the noise, larger after quick commands (`quick_scale`)
-    V               covariance of a sample with its scale, q r R, where r is at least that of `recent_scale`
+    V               covariance of a sample with its scale, q r R, where r is at least `posterior.recent_scale`
     e, S, K         residual y - C' x (3,), its covariance (3, 3), gain (N, 3)
     d2              e' S^-1 e
     ll              log likelihood of a sample

@@ -1,12 +1,13 @@
 """Plain least squares, and statistics of its residual.
 
-y = Z b + e,    X = Z / s,    b = P X' y / s
+X = Z / s,    y = X b + e,    b = P X' y;    the coefficients of Z are b / s
 
 n, m    samples; columns
 Z, y    regressors (n, m); the values to explain, (n,) or (n, k)
 s, X    root mean square of each column (m,); the columns divided by it
-b, e    coefficients (m,) or (m, k); residuals (n,) or (n, k)
-P       inverse of X' X (m, m); the pseudo-inverse in `fit_ols`, where columns may depend on one another
+b, e    coefficients of X (m,) or (m, k); residuals (n,) or (n, k)
+P       inverse of X' X (m, m); in `fit_ols` the pseudo-inverse, since columns may depend on one another; in
+        `coefficient_bounds` with a floor
 """
 
 from dataclasses import dataclass
@@ -116,8 +117,8 @@ def left_by(Z: Floats, y: Floats) -> Floats:
 
 def noise_scale(e2: Floats) -> float:
     """Scale of the variance of the noise, by the squares of a whitened residual (3 n,) or (n, 3). Faults of
-    few samples hardly change it, because it is the median of the sums over three axes, over that of
-    chi-squared."""
+    few samples hardly change it: it is the median of the sums over three axes, over the median of a
+    chi-squared variable with three degrees of freedom."""
     return float(np.median(e2.reshape(-1, 3).sum(axis=1)) / _MEDIAN_CHI2)
 
 
@@ -130,9 +131,10 @@ def variance_inflation(Z: Floats) -> Floats:
     X = Z - Z.mean(axis=0)
     norms = np.sqrt((X**2).sum(axis=0))
     factors = np.full(Z.shape[1], np.inf)
-    varying = norms > 1e-12
+    varying = norms > _RANK_TOLERANCE * np.sqrt((Z**2).sum(axis=0))
     X = X[:, varying] / norms[varying]
     lam, V = np.linalg.eigh(X.T @ X)
+    # An eigenvalue of 0 is so small instead that the columns in its direction get a factor of inf.
     lam = np.where(lam > _RANK_TOLERANCE * lam.max(initial=0.0), lam, _RANK_TOLERANCE**2)
     factors[varying] = (V**2 / lam).sum(axis=1)
     return np.where(factors < 1.0 / _RANK_TOLERANCE, factors, np.inf)

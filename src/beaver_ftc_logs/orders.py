@@ -1,7 +1,7 @@
 """Fit a model of a given order to parts of flights. The Bayesian information criterion chooses the order.
 
 h, L            number of past samples of the rates, and of the commands: the order
-Z, y            regressors (n, m) and rates (n, 3), rad/s
+Z, y            regressors (n, m) and rates (n, 3), rad/s, each row times the weight of its flight
 """
 
 from itertools import product
@@ -27,9 +27,10 @@ _MIN_RATE_SD = 1e-6  # rad/s, less than any gyro resolves
 def bic_by_order(parts: Parts, vehicle: Vehicle) -> dict[tuple[int, int], float]:
     """The Bayesian information criterion of each number of past samples of rates and commands.
 
-    With N = Z / d, the root mean squares d (m,) of the columns of Z, and the m columns of an order:
+    With N = Z / d, the root mean squares d (m,) of the columns of Z, and the m columns of an order; ^+:
+    pseudo-inverse:
 
-        beta = (N' N)^-1 N' y,    BIC = n log det((y' y - (N' y)' beta) / n) + 3 m log n
+        beta = (N' N)^+ N' y,    BIC = n log det((y' y - (N' y)' beta) / n) + 3 m log n
 
     The regressors of each order are among those of the largest, so N' N and N' y are computed once.
     """
@@ -88,7 +89,7 @@ def fitted_order(parts: Parts, vehicle: Vehicle, h: int, L: int) -> tuple[least_
 
 
 def fit_order(parts: Parts, vehicle: Vehicle, h: int, L: int) -> least_squares.Regression:
-    """Least squares of a given order over all flights. Raises BadInput if they have fewer than ten samples a
+    """Least squares of a given order over all parts. Raises BadInput if they have fewer than ten samples a
     coefficient of an axis, or if a rate does not move."""
     Z, y, stretch = stack_data(parts, vehicle, h, L)
     if len(y) < 10 * Z.shape[1]:
@@ -104,7 +105,7 @@ def fit_order(parts: Parts, vehicle: Vehicle, h: int, L: int) -> least_squares.R
 
 
 def stack_data(parts: Parts, vehicle: Vehicle, h: int, L: int) -> tuple[Floats, Floats, Ints]:
-    """Regressors Z (n, m), rates y (n, 3) and number of the gap-free run (n,) over all flights, each sample
+    """Regressors Z (n, m), rates y (n, 3) and number of the gap-free stretch (n,) over all parts, each sample
     times the weight of its flight. Every order leaves out the same first samples of a flight; after a gap, a
     larger order leaves out more.
 
@@ -151,7 +152,7 @@ def _model_of_fit(fit: least_squares.Regression, parts: Parts, vehicle: Vehicle,
     except ValidationError as error:
         raise refusal(
             "identify",
-            f"no model file can hold the {error.errors()[0]['loc'][0]} of this fit",
+            f"no model file can hold the {(*error.errors()[0]['loc'], 'numbers')[0]} of this fit",
             "three rates of which none follows from the others, commands as shares of travel",
         ) from None
     return model.model_copy(update={"colours": fit_noise_models(parts, model)})

@@ -1,15 +1,16 @@
 """The one regression of a flight: the regressors of the next sample's rates, the residuals of a model
-(`Innovations`), and least squares on both. Identification, checks, detection and bounds all use it.
+(`Innovations`), and least squares on these. Identification, checks, detection and bounds all use it. Least
+squares on the regressors: orders.py.
 
     rates[k] = c + A' x[k] + sum over groups g of a_g F_g[k] + noise,      F_g[k] = sum_j B_gj u_g[k-j]
 
-    n, G, S, D      number of samples; of groups; of surfaces; of signals
+    n, G, D         number of samples; of groups; of signals
     h, L, f         number of past samples of the rates; of the commands; of the signals
     c               intercept (3,), rad/s
     x, X            the past of a sample: rates[k-1..k-h], signals[k-1..k-f], (3 h + D f,); of all samples
     A               coefficients of the past (3 h + D f, 3)
     u, U            commands of the groups, shares of travel, (n, G); the same at the lags 1 to L (n, G, L)
-    a               effectiveness of each group (G,)
+    a               effectiveness of each group, the gain of its response (G,)
     B, F            response (G, L, 3), rad/s; effect of the healthy groups (n, G, 3), rad/s
     y               rates that the past leaves unexplained (n, 3), rad/s
     e, R, W         residual (n, 3), rad/s; its covariance (3, 3), (rad/s)2; whitening matrix: e W is white
@@ -102,7 +103,7 @@ class Innovations:
 
     @property
     def log_size(self) -> float:
-        """Logarithm of the size of a sample's noise before it was whitened, log det(R)^1/2 - 3 log sum(ma).
+        """Logarithm of the size of a sample's noise before it was whitened, (1/2) log det R - 3 log sum(ma).
 
         The filter sum(ma) / ma(z), which whitens, multiplies the white noise of each of 3 axes by sum(ma).
         """
@@ -118,7 +119,7 @@ class Innovations:
         return replace(self, **chosen)
 
     def columns(self) -> Floats:
-        """Effects of trim and responses in standard deviations of the noise, W' [1, F'], (n, 3, 3 + G)."""
+        """Effects of trim and responses in standard deviations of the noise, W' [I, F'], (n, 3, 3 + G)."""
         trim = np.broadcast_to(np.eye(3), (len(self.F), 3, 3))
         return (np.concatenate([trim, self.F], axis=1) @ self.W).transpose(0, 2, 1)
 
@@ -139,7 +140,8 @@ class Innovations:
         return np.asarray(np.linalg.lstsq(*self.regression(), rcond=None)[0][3:])
 
     def quick_power(self, rate_hz: float) -> Floats:
-        """Power of the quick part of the responses, a mean over the axes, in variances of the noise, (n,):
+        """Power of the quick part of the responses, summed over the groups and averaged over the whitened
+        axes, in variances of the noise, (n,):
 
             sum over g of |(F_g - mean of F_g over the last _QUICK_SPAN_S) W|^2 / 3
 
@@ -156,8 +158,8 @@ class Innovations:
 
             q = 1 + quick_error^2 max(quick power - usual quick power, 0)
 
-        Slow commands of healthy flight hardly show how a surface responds to a step. The error after a step
-        is no noise: it has the same sign in many samples.
+        q is the result. Slow commands of healthy flight hardly show how a surface responds to a step, so the
+        error of a quick response grows with its power.
         """
         excess = np.maximum(self.quick_power(model.rate_hz) - self.noise.usual_quick_power, 0.0)
         return 1.0 + model.settings.quick_error**2 * excess
@@ -179,7 +181,8 @@ def innovations(samples: Samples, model: Model, labelled: bool = False) -> Innov
     ar = noise.ar
     y = subtract_noise(samples.rates - np.einsum("nm,mr->nr", X, A), ar)
     F = subtract_noise(np.einsum("ngl,glr->ngr", U, B), ar)
-    is_known = known.copy()  # a row that is not known makes the p next ones unknown: `ar` uses it for them
+    is_known = known.copy()
+    # The p first rows, and the p rows after an unknown one, are unknown too: `ar` predicts from the p before.
     for lag in range(1, len(ar) + 1):
         is_known &= _delay_rows(known, lag, False)
     c = c - c @ ar.sum(axis=0)
@@ -207,7 +210,7 @@ def subtract_noise(values: Floats, ar: Floats) -> Floats:
         t[k, g] = s[k, g] - sum over lags l = 1..p of ar[l-1]' s[k-l, g]
 
     For each entry (i, j) of the matrices, from axis i of s to axis j of t, the sum is a convolution in time.
-    A NaN spreads over the p next rows at most.
+    A NaN spreads to all axes of the p next rows at most.
     """
     result = values.copy()
     if not len(ar) or not values.size:

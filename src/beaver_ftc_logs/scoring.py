@@ -42,7 +42,7 @@ def score_against_labels(rows: LogRows, labels: Floats) -> Document:
 
     classes             share of rows whose estimate is nearest to the same setting as the label
     healthy_or_faulty   share of rows with an alarm if a label is below 1, and without one if none is
-    side                share of rows in which estimate and label are below 1 for the same surfaces
+    side                share of rows in which the same surfaces are below 1 in estimate and label
     mean_error          mean magnitude of estimate less label, over rows and surfaces
     held_by_bounds      share of rows and surfaces whose label is within the bounds of the estimate
 
@@ -86,14 +86,16 @@ def score_against_failures(
 ) -> Document:
     """Scores against the first failure in the log.
 
-    failure, failure_s   surfaces that failed, joined by +, and time of the first failure, s; None without one
+    failure, failure_s   surfaces of the first failure (within _SAME_FAILURE_S), joined by +, and its time, s;
+                         None without one
     healthy_s            time from the first row to the last one before the failure, s
     false_alarms         number of alarms that begin before the failure
-    detected, delay_s    whether a row from the failure on has an alarm; time of the first one after it, s
-    named                share of these rows by the isolated surfaces
+    detected, delay_s    whether a row from the failure on has an alarm; time from the failure to the first, s
+    named                share of the rows with an alarm from the failure on, by their isolated surfaces
     right_group          whether the most frequent name is right (`_is_main_name_right`)
 
-    An alarm that lasts over the failure counts as both: it is false, and it detects with the delay 0 s.
+    An alarm that lasts over the failure counts as both: it is false, and it detects with a delay of less than
+    one step.
     """
     first_s = min((failure.t_s for failure in failures), default=np.inf)
     onset = Onset(None if np.isinf(first_s) else float(first_s))
@@ -119,7 +121,8 @@ def _is_main_name_right(
     shares: dict[str, float], surfaces: list[str], groups: list[list[str]]
 ) -> bool | None:
     """Whether the most frequent name after the failure of some surfaces is a group that failed; None without
-    a name, or if no group has failed. A name of several groups is right if all of them failed.
+    a name, or if no group has failed. A name of several groups is right if all of them failed; `unknown`
+    counts as no name, `engine` as a wrong one.
 
     A log may name a kind of surface for one of them: a failed `aileron` is right_aileron or left_aileron. Of
     the groups [right_aileron], [left_aileron] and [elevator], the names right_aileron and

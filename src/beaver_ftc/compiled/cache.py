@@ -34,7 +34,7 @@ from beaver_ftc.documents.errors import say_once
 from beaver_ftc.documents.files import read_own
 
 COMPILING = "compiling flight code that is new to this machine, once: about {:.0f} s on an idle one"
-PER_S = 17_000  # characters of `what_follows` compiled in a second: 11000 to 25000, by the kernel
+PER_S = 17_000  # characters of `digest.what_follows` compiled in a second: 11000 to 25000, by the kernel
 PATIENCE_S = 1.0  # what takes less needs no word
 MOST_BYTES = 500_000_000  # of code kept in a folder: some hundred versions of the flight code
 _DIGEST_BYTES = 32  # before the code in a file

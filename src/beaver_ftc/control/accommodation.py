@@ -21,7 +21,8 @@ divided by it.
 Records among the arguments, and the file that defines each:
 
     supervisor, surfaces (output, config)    this file
-    verdict, assessment                      diagnosis/conclusion.py
+    verdict                                  diagnosis/conclusion.py
+    assessment                               diagnosis/assessment.py
     faults, true faults of the instant       loop/frame.py
     config of a law                          control/state.py
     layout                                   control/allocation.py

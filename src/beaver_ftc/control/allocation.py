@@ -1,8 +1,8 @@
 """Allocation: the surfaces that give the demanded angular accelerations.
 
-An aircraft with one surface an axis and a stand-in needs a few lines: the lateral pair, the elevator, and the
-hand-over from elevator to flap (`allocate`). general_allocation.py serves any other set of surfaces;
-authority.py computes what surfaces can give at all.
+An aircraft with one surface an axis and at most one stand-in needs a few lines: the lateral pair, the
+elevator, and the hand-over from elevator to flap (`allocate`). general_allocation.py serves any other set of
+surfaces; authority.py computes what surfaces can give at all.
 
 Words for surfaces:
 
@@ -48,8 +48,8 @@ def axes_dtype(n: int) -> np.dtype:
     """What the surfaces are to do about each axis (3,), rad/s2.
 
     G (3, n)        rad/s2 per rad, times the effectiveness of each surface
-    demand, hold    what the law demands, and the part that only holds the rates; both less the moments of
-                    offsets
+    demand, hold    what the law demands, and the part that only holds the rates; after `subtract_offsets`
+                    both less the moments of offsets
     disturbance     what the law's observer finds, if it has one
     shortfall       the part of the demand that was not given
     beyond          whether not even the rates can be held
@@ -66,8 +66,9 @@ def allocation_dtype(n: int) -> np.dtype:
     command (n,)     rad
     saturated (n,)   whether a stop limits the command of a surface
     hand_over        how far pitch is handed over to the stand-in, 0 to 1
-    lost_share       the part of pitch that the main surface has lost, 0 to 1
-    transfer_share   the part of pitch that the stand-in carries now, 0 to 1 (`hand_over_pitch`)
+    lost_share       the part of the authority in pitch that is lost, 0 to 1
+    transfer_share   the part of pitch that the stand-in carries under a law with an observer, 0 to 1
+                     (`hand_over_pitch`)
     """
     return record(
         config=record(hand_over_step=float), memory=record(problem=problem_dtype(n)),
@@ -180,17 +181,18 @@ def pitch(axes, output, layout, effectiveness, share, probe):
     the flap is short: what it cannot give returns to the elevator. Without a flap the elevator carries what
     it can. Both are limited to their travel.
 
-        u_f = trim_f + share ((demand - hold) / G_f - trim_f) + probe,    hold = G_e / effectiveness trim_e
+        u_f = trim_f + share ((demand - trimmed) / G_f - trim_f) + probe
+        trimmed = G_e / effectiveness trim_e
         u_e = (demand - G_f u_f) / G_e
 
-    G_e, G_f: of pitch, rad/s2 per rad, with the effectiveness of each surface in it; effectiveness: of the
-    elevator; probe: rad of the flap.
+    An elevator that is given up (G_e = 0) leaves the flap the whole demand. G_e, G_f: of pitch, rad/s2 per
+    rad, with the effectiveness of each surface in it; effectiveness: of the elevator; probe: rad of the flap.
     """
     G, u, demand = axes.G, output.command, axes.demand[PITCH]
     e, f = layout.main[PITCH], layout.stand_in
     if f >= 0:
-        hold = divide(G[PITCH, e], effectiveness) * layout.trim[e]
-        flap = layout.trim[f] + share * (divide(demand - hold, G[PITCH, f]) - layout.trim[f])
+        trimmed = divide(G[PITCH, e], effectiveness) * layout.trim[e]
+        flap = layout.trim[f] + share * (divide(demand - trimmed, G[PITCH, f]) - layout.trim[f])
         u[f] = clip(output, layout, f, flap + probe)
         demand -= G[PITCH, f] * u[f]
     u[e] = clip(output, layout, e, divide(demand, G[PITCH, e]))
@@ -198,7 +200,8 @@ def pitch(axes, output, layout, effectiveness, share, probe):
 
 @kernel
 def allocate(axes, output, layout, effectiveness, share, probe):
-    """Fill the command (n,) rad for axes.demand (3,) rad/s2; share, probe: see `pitch`."""
+    """Fill the command (n,) rad for axes.demand (3,) rad/s2; effectiveness (n,); share, probe: see
+    `pitch`."""
     lateral(axes, output, layout)
     pitch(axes, output, layout, effectiveness[layout.main[PITCH]], share, probe)
 
@@ -209,8 +212,8 @@ def spill_to_flap(axes, output, layout):
 
         u_f = (demand - G_e u_e) / G_f        if the elevator is saturated
 
-    The observer of the law finds what an elevator does not do that is jammed or too weak. The law then
-    demands more than the elevator can give. The flap need not wait until the fault is named.
+    If the elevator is jammed or too weak, the observer of the law finds what it does not do, and the law
+    demands more than it can give. The flap need not wait until the fault is named.
     """
     G, u = axes.G, output.command
     e, f = layout.main[PITCH], layout.stand_in
@@ -245,12 +248,12 @@ def hand_over_pitch(allocation, reallocated, at_once, remains, least):
 
         hand_over <- hand_over + step, at_once at least 1 - remains      if reallocated
         hand_over <- hand_over - step                                    otherwise; within 0 and 1
-        lost_share = 1 - remains, or 1 if remains < least
+        lost_share = 1 - remains, or 1 if remains < least        if reallocated, or if nothing remains
         transfer_share = smoothstep(hand_over) lost_share        smoothstep(1) if nothing remains
 
-    at_once: whether the lost part is handed over in one frame, as after a jam. remains: remaining share of
-    the authority in pitch (`remaining`). While pitch is handed back, lost_share stays: the estimate of the
-    main surface may return to 1 in one frame, but the command must not jump.
+    at_once: whether hand_over starts at the lost part, 1 - remains, as after a jam. remains: remaining share
+    of the authority in pitch (`authority.remaining`). Else lost_share stays while pitch is handed back: the
+    estimate of the main surface may return to 1 in one frame, but the command must not jump.
     """
     output, step = allocation.output, allocation.config.hand_over_step
     output.hand_over = min(max(output.hand_over + (step if reallocated else -step), 0.0), 1.0)

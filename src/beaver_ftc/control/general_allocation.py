@@ -7,7 +7,8 @@ allocation.py, which has the words for surfaces and the records.
     effectiveness    (n,)
     prediction       u (n,) rad, where the surfaces are, and their actuators; w: length of a JSBSim frame in
                      frames
-    share, probe     as in `allocation.pitch`
+    share            as in `allocation.pitch`
+    probe            rad; if it is not 0, the stand-in is held at its trim + probe
 """
 
 from beaver_ftc.compiled import apart, kernel
@@ -41,17 +42,18 @@ def allocate_generally(axes, allocation, layout, effectiveness, prediction, shar
 @kernel
 def set_problem(problem, G, layout, effectiveness, prediction, share):
     """Fill the problem of this frame: the limits of each surface, rad, the deflection that it prefers, rad,
-    and the weight with which it leaves that, rad2.
+    and the weight of its motion away from that (a larger one moves more), rad2.
 
         low, high = u -+ reach, within the stops        reach: by the rate limit in a frame, rad
         u_preferred = trim / E, within the stops        E: effectiveness; trim if E is 0
         weight = half^2,  of a backup half^2 ratio      half: half the travel, rad
         ratio = share others / ((1 - share) backups)    within RELUCTANT and 1 / RELUCTANT
 
-    others, backups: sums of half^2 G_pitch^2 over the surfaces that are no backups, and over the backups.
+    With trim / E a weakened surface keeps its trimmed moment. others, backups: sums of half^2 G_pitch^2 over
+    the surfaces that are no backups, and over the backups.
 
     Why this ratio: the backups then give `share` of what pitch demands beyond the trimmed moments. With two
-    surfaces that move pitch alone this is the published hand-over.
+    surfaces that move pitch alone this is the hand-over of `allocation.pitch`, up to the limits.
     """
     others, backups, u = 0.0, 0.0, prediction.u
     for s in range(u.size):

@@ -15,7 +15,8 @@ acceleration.
 Sign conventions: body axes X forward, Y right, Z down; positive moments right wing down, nose up, nose
 right.
 
-*Simplified models.* A scenario may ask for a model that is wrong on purpose (`design_of`, `anchor`):
+*Simplified models.* A scenario may ask for a model that is wrong on purpose (`design_of`,
+`plain_model.anchor`):
 
     engine terms neglected, other coefficients, another mass or inertia     only other numbers in the record
     frozen alpha                f(x, y) and G(y) with alpha held at its trim value, all else as measured
@@ -223,7 +224,7 @@ def acceleration(f, G, u, out):
 
 def design_of(declared: Any) -> np.ndarray:
     """The design record (1,) of a `Declared`: the aircraft's file with the errors and simplifications of the
-    designer. A linearised or frozen model also needs `anchor`.
+    designer. A linearised or frozen model also needs `plain_model.anchor`.
     """
     model = declared.design_model
     design = design_record(declared.aircraft, scale=declared.scale, mass=declared.mass)

@@ -1,13 +1,14 @@
 """The conclusion about the surfaces: the alarm, surface and type of the fault, and the surface on which the
 law acts.
 
-The stages of the diagnosis return their findings, and the schemes (schemes/) hand each of them to a kernel of
-this file, which alone writes the conclusion:
+The stages of the diagnosis return their findings. The schemes (schemes/), and for the sensor monitor
+loop/frame.py, hand each of them to a kernel of this file, which alone writes the conclusion:
 
     a detector        the axis of its alarm
     the isolation     the only remaining estimator
     the fault types   a surface with its type
     a monitor         that the cause is no surface
+    a plug-in         its verdict
 
 What the laws read of each surface: assessment.py. Symbols: fies, j: isolation estimators, and the number of
 one; s: surface; t: time, s.
@@ -35,7 +36,8 @@ def conclusion_dtype(n: int) -> np.dtype:
 
     The fault:
     detected, detected_at_s, axis: whether there is an alarm, since when, on which axis
-    isolated_estimator, isolated_at_s: estimator of the isolated fault, NOT_ISOLATED or UNANTICIPATED
+    isolated_estimator: estimator of the isolated fault, NOT_ISOLATED or UNANTICIPATED
+    isolated_at_s: since when
     fault_type, typed_at_s: number of its type, -1 if open, and since when
     target, accommodation_mode: the surface on which the law acts, and how; -1 for none
     has_effectiveness, effectiveness (n,): of every surface, if a plug-in estimates it
@@ -97,7 +99,7 @@ def record_decision(conclusion, finding, lead):
 
 @kernel
 def record_plugin_verdict(conclusion, plugin, t):
-    """Replace the built-in conclusion at t s by the verdict of a plug-in."""
+    """Take alarm, isolated fault and effectiveness at t s from the verdict of a plug-in; an alarm stays."""
     if plugin.detected:
         latch_alarm(conclusion, plugin.axis, t)
     set_isolated(conclusion, plugin.isolated if conclusion.detected else NOT_ISOLATED, t)

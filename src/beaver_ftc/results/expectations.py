@@ -2,8 +2,8 @@
 
 An expectation fails if its quantity does not exist, for example if there was no alarm, unless it expects an
 absence. A name that was given before its fault began meets no expectation. A failed expectation of the
-diagnosis has a reason if the name was premature or withdrawn, or if there were frames in which the diagnosis
-could conclude nothing.
+diagnosis has a reason if the name was premature, if the one name that `isolated_as` expects was withdrawn, or
+if there were frames in which the diagnosis could conclude nothing.
 """
 
 from collections.abc import Iterator
@@ -30,7 +30,7 @@ class Rule:
     says: str
 
     def actual(self, metrics: Metrics) -> Any:
-        """The value in the metrics."""
+        """The value in the metrics; a tuple as a list, as a scenario file has it."""
         value = metrics.at(self.path)
         return list(value) if isinstance(value, tuple) else value
 
@@ -155,7 +155,8 @@ def expectation_names(expect: Any) -> list[str]:
 def expected_of(expect: Any) -> Iterator[tuple[str, Any]]:
     """(name, value) of each expectation that is set in `expect`. An entry of a section has the name
     `section.key`."""
-    for name, expected in expect.model_dump(exclude_none=True).items() if expect else ():
+    entries = expect.model_dump(exclude_none=True) if expect else {}
+    for name, expected in entries.items():
         if isinstance(expected, dict):
             yield from ((f"{name}.{part}", limit) for part, limit in expected.items())
         else:

@@ -129,7 +129,7 @@ def open_loop(
 
 def interpolated(law: DefaultLaw, qdyn: float, lost: float) -> np.ndarray:
     """Kp, L_rate and L_disturbance, rows of (3, 3) over the axes, at a dynamic pressure (Pa). lost: share of
-    pitch that is handed over to the stand-in, 0 to 1. `schedule` in control/laws/rejecting.py computes the
+    pitch that is handed over to the stand-in, 0 to 1. gain_schedule.py (`schedule`) computes the
     same."""
     schedules = law.Kp, law.L_rate, law.L_disturbance
     values = np.array([[np.interp(qdyn, law.qdyn_pa, row) for row in rows] for rows in schedules])

@@ -4,7 +4,8 @@ data violate.
     event                      inequalities, each in both directions along each axis
     alarm                      of frame k by itself, then of each detection filter
     exclusion of a surface     of frame k, of the detection filters, of the isolation filter since the alarm;
-                               then, if the scenario declares a constant theta, of this theta (`of_estimator`)
+                               then, if the scenario declares a constant theta, of this theta
+                               (`of_constant_theta`)
     exclusion of a type        of the last frames, or of those that health does not explain (`of_type`); of a
                                block, as a sum over its frames (`of_block`)
 

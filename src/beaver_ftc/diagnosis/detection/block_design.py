@@ -51,10 +51,10 @@ def hypotheses_by_block(aircraft: Aircraft) -> Iterator[tuple[tuple[int, ...], l
     """Axes and hypotheses of each block of the rates, in their order; roll and yaw come twice
     (statistical.py).
 
-        LOSS, GROWING_LOSS, LOSS_END    of each surface that may lose effectiveness and whose dominant axis is
-                                        in the block
-        STEP_FAULT                      on each axis of the block
-        ALPHA_CUBED_MOMENT              on pitch
+        LOSS                       of each surface of `class_of_losses` whose dominant axis is in the block
+        STEP_FAULT                 on each axis of the block
+        ALPHA_CUBED_MOMENT         on pitch
+        GROWING_LOSS, LOSS_END     of each of these surfaces in turn
 
     Only LOSS and STEP_FAULT raise alarms. Columns of scores: by loss, then by axis of a step.
     """
@@ -76,9 +76,9 @@ def configure_block(
 ) -> None:
     """Fill axes, directions m (axes, N_ROWS), filter and hypotheses of a block, and its other fields.
 
-    R (axes,), (rad/s)2: variance of a reading of the rates, and so of their estimate at the start; the drift
-    is a random walk, a = 1. A step acts along the direction of its axis; the other signatures follow in
-    flight (`rows.project_rows`).
+    R (axes,), (rad/s)2: variance of a reading of the rates, and so of their estimate at the start. a is 1
+    until `statistical.fill_drift` fills the decay of the drift. A step acts along the direction of its axis;
+    the other signatures follow in flight (`rows.project_rows`).
     """
     n = len(axes)
     fill(b, n=n, a=1.0, Q_scale=1.0, n_h=len(entries), **others)

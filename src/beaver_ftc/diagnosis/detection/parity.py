@@ -6,7 +6,7 @@ the innovation nu, rad/s2, on a parity direction m that is orthogonal to this co
     m' nu        with  m' g = 0,  |m| = 1
 
 does not depend on a fault of s. If a test finds a signal in this projection, s is not the (only) cause. Each
-direction is a view: a block of one axis (likelihood.py) with tests for a step, for a loss of another surface
+direction is a view: a block of one axis (blocks.py) with tests for a step, for a loss of another surface
 and for an oscillation (tones.py). The directions are
 
 * each axis, for the surfaces that do not move it;

@@ -115,7 +115,7 @@ def required_size(aircraft: Aircraft) -> StatisticalSize:
     """The capacities that the records of an aircraft need.
 
     regressors    block of rates    readings + terms of its moments
-                  view              the same + terms of a force + further constants of a force (forces.py:
+                  view              the same + terms of a force + further constants of a force (rows.py:
                                     MAX_FORCE_REGRESSORS - MAX_TERMS_OF_ONE) + 2: the drift of the flow
                                     angle from inertial motion, and the leak
     hypotheses    block of rates    3 for each surface (loss, growing loss, end of a loss) + 2: a step on

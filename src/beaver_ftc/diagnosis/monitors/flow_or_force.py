@@ -40,8 +40,8 @@ from beaver_ftc.diagnosis.monitors.redundancy import FORCE_JUMP_M_S2
 from beaver_ftc.diagnosis.monitors.residual_bounds import AB_NOW, speed, too_steep
 from beaver_ftc.plant.instruments import AX, N_SENSORS, PHI
 
-# Number of repeated readings for a sensor that is never called frozen: its sound reading may repeat, because
-# the steps of its resolution exceed its noise
+# Number of repeated readings of a sensor that is never called frozen: its resolution exceeds its noise, so
+# that a sound reading may repeat.
 N_FROZEN_NEVER = 1_000_000_000
 JUMP_WINDOW_S = 1.0  # a jump counts within this time after the alarm: later, one by chance is too likely
 JUMP_MEMORY_S = 2.0  # time constant with which the largest jump of an accelerometer fades
@@ -64,7 +64,7 @@ FLOW_FIELDS = {
     "flow": (FLOW_RECORD, 3),
     "n_same": (int, N_SENSORS),  # how many samples in a row each reading has equalled the one before
     "cleared": (int, N_SENSORS),  # whether each sensor is cleared
-    "turn_max": float,  # rad: largest turn of the attitude beyond sound gyros, 0 if unknown (attitude.py)
+    "turn_max": float,  # rad: largest turn of the attitude by sound sensors, 0 if unknown (gyro_turn.py)
     "jump": float,  # largest change of an accelerometer between two samples, m/s2; it fades
     "n_since": int,  # samples since the alarm
     "climb": N_POLES,  # m: filtered effect on the altitude of the error that the incidence's sums show
@@ -126,14 +126,14 @@ def clear_sensors(mon, y):
 
 @kernel
 def flow_jumped(mon, y, i):
-    """Whether, soon after the alarm, the residual exceeds any jump of an accelerometer in one sample, and the
-    reading of the flow sensor i jumps with it.
+    """Whether, soon after the alarm, the residual exceeds the effect of a sound accelerometer's jump in one
+    sample, and of the largest jump seen of late, and the reading of the flow sensor i jumps with it.
 
-        |r| > B + FORCE_JUMP_M_S2 per_a,    |ddy| >= MIN_JUMP_SHARE |r| > 3/2 jump per_a
+        |r| > B + FORCE_JUMP_M_S2 per_a,    |ddy| >= MIN_JUMP_SHARE |r| > AB_NOW jump per_a
 
     r: residual of the sample, and B its bound, in m/s for the speed, else rad; per_a: residual by an
     acceleration error of 1 m/s2 in one sample, h or h / V; ddy: second difference of the reading, with which
-    a step shows at any slope of the reading; jump: of `count_same`, m/s2; 3/2: weight of the present
+    a step shows at any slope of the reading; jump: of `count_same`, m/s2; AB_NOW: weight of the present
     acceleration in the integration (redundancy.py).
     """
     j = mon.output.alarm_test
@@ -155,8 +155,8 @@ def sum_flow(mon, y):
         climb <- a climb + h V alpha cos(phi) cos(theta)
 
     E, H: bound on an error from the start, as of the alarm, and its effect (initial_errors.py); V m/s:
-    airspeed. At the sample of the alarm the sums start: r_sum, H_sum at 0, B_sum at the noise of two samples
-    and the effect of a gust. alpha, rad, is the error of the incidence that sound sensors do not explain;
+    airspeed. r_sum and H_sum are 0 until the alarm; then B_sum starts at the noise of two samples and the
+    effect of a gust. alpha, rad, is the error of the incidence that sound sensors do not explain;
     climb, m, is its effect on the altitude through each filter of decay a.
     """
     for n, f in enumerate(mon.flow):
@@ -229,7 +229,7 @@ def clear_gyros(mon, y):
         |residual_i| < turn_max < |residual| - B        residual, B: of the test of the alarm, rad
 
     turn_max, rad, is the largest turn by noise and constant errors with the declared probability
-    (attitude.py), 0 if unknown. Near the vertical the attitude shows no turn.
+    (gyro_turn.py), 0 if unknown. Near the vertical the attitude shows no turn.
     """
     alarm = mon.output.alarm_test
     unexplained = abs(mon.residual[alarm]) - mon.B[alarm, 0]

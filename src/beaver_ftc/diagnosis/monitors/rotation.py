@@ -26,7 +26,7 @@ def times(p, q):
 
 @kernel
 def inverse(q):
-    """q*: the turn back."""
+    """q*: the turn back of a q of length 1."""
     return q[0].conjugate(), -q[1]
 
 
@@ -38,7 +38,7 @@ def turned(q, v):
 
 @kernel
 def combined(a, v, b, w):
-    """a v + b w of two quaternions or vectors."""
+    """a v + b w; v, w: quaternions or vectors; a, b: numbers."""
     return a * v[0] + b * w[0], a * v[1] + b * w[1]
 
 
@@ -56,7 +56,7 @@ def vector(x):
 
 @kernel
 def components(q):
-    """The components (3,) of a vector, or of a quaternion's part that is one."""
+    """The components (3,) of a vector, or of the vector part of a quaternion."""
     return q[0].imag, q[1].real, q[1].imag
 
 

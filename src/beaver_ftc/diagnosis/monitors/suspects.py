@@ -65,7 +65,8 @@ from beaver_ftc.plant.instruments import AX, N_SENSORS, PHI
 
 # A residual below this share of the largest of the three axes, or angles, is taken for the coupling of that
 COUPLING_SHARE = 0.03
-MIN_AXIS_SHARE = 0.5  # least share of the spurious velocity along the axis of a suspected accelerometer
+# Least spurious velocity along the axis of a suspected accelerometer, a share of the largest component.
+MIN_AXIS_SHARE = 0.5
 # A test within its bound B hides an error whose effect is up to this factor times B, because the effect of
 # sound sensors, up to B, may have the other sign. For the gyro that turns the flow by all of its error it is
 # also the margin on the bound of the flow's test.
@@ -77,7 +78,8 @@ def latch_exceeded(mon):
     """Record the tests that have exceeded their bounds since the alarm, and which hypotheses they refute.
 
     The tests of turning, and those of the angles, come in threes. An error on one axis moves the two others a
-    little, so a residual counts only if it is larger than COUPLING_SHARE times the largest of its three.
+    little, so a residual of this sample, through filter 0, counts only if it is larger than COUPLING_SHARE
+    times the largest of its three.
     """
     exceeded = mon.exceeded
     for j in range(N_TESTS):
@@ -94,8 +96,9 @@ def latch_exceeded(mon):
 def find_suspects(mon):
     """Fill suspect (N_SENSORS,): the sensors whose error explains all tests since the alarm.
 
-    Errors from the start come last: another sensor's error from the start does not explain why a suspect is
-    frozen, so none is added to a frozen suspect. None is added to the suspects of a duplicate sensor, either.
+    Errors from the start come last: another sensor's error from the start does not explain why a suspect
+    stands still, so none is added to such a suspect. None is added to the suspects of a duplicate sensor,
+    either.
     """
     suspect = mon.output.suspect
     alarm = mon.output.alarm_test
@@ -155,8 +158,8 @@ def suspect_attitude(mon):
         angle    if no test of another angle shows an error that this angle's error from the start does not
                  explain (of psi: any error), the error explains the tests of turning (`explains_turns`) or
                  its own test shows it, and the gyro that would be at fault instead is not confirmed
-                 also if its reading repeats, but too shortly to call it frozen, and its error explains the
-                 tests of turning
+                 also if it can be called frozen, its reading repeats, but too shortly for that, and its
+                 error explains the tests of turning
 
     turns, angles (3,): which tests of turning, and of the angles, have been exceeded; refuted (2, 3): which
     of the angles' tests refute an error from the start of phi, and of theta; axis: of the gyro that would be
@@ -216,9 +219,10 @@ def explains_turns(mon, i):
 def suspect_flow(mon, alarm):
     """Suspect the flow sensor of the test, the accelerometers, and, of the incidence or the sideslip, gyros.
 
-    If a test of turning is exceeded, only a gyro can be the cause, because flow sensors and accelerometers do
-    not move the tests of the attitude. Otherwise a gyro is suspected if its error may be hidden in the test
-    of its axis. Cleared sensors (flow_or_force.py) are no suspects.
+    If a test of turning is exceeded, only a gyro can be the cause of an alarm of incidence or sideslip,
+    because flow sensors and accelerometers do not move the tests of the attitude. Otherwise a gyro is
+    suspected if its error may be hidden in the test of its axis. Cleared sensors (flow_or_force.py) are no
+    suspects.
     """
     suspect = mon.output.suspect
     turns = mon.exceeded[:ANGLE_TEST]
@@ -255,7 +259,8 @@ def gyro_hidden(mon, j, i):
 
 @kernel
 def suspect_accelerometers(mon):
-    """Suspect the accelerometers along whose axis most of the spurious velocity dv is, m/s:
+    """Suspect the accelerometers along whose axis the spurious velocity dv, m/s, is about half of its
+    largest component or more:
 
         dv_i >= MIN_AXIS_SHARE max(dv) - B,    B = B_V + V (B_alpha + B_beta)
 

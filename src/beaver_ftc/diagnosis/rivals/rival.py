@@ -14,19 +14,20 @@ UNANTICIPATED = Verdict(True, None, "unanticipated", "unanticipated")
 
 
 class RivalDetector:
-    """Base of the rival detectors; each has `start`, `advance` and `isolate`.
+    """Base of the rival detectors; each has `start`, `advance` and `isolate`, and may have
+    `begin_isolation`.
 
     After `reset`, options has the parameters, context and dt (s) are those of the flight (its turbulence: see
-    `reset`), leading (3,) has the surfaces that lead roll, pitch and yaw, and alarm_s, alarm_axis describe
-    the alarm (inf: none yet).
+    `reset`), leading (3,) has the surfaces that lead roll, pitch and yaw, and alarm_s (inf: none yet)
+    and alarm_axis describe the alarm. A detector with one statistic has the alarm axis 0.
     """
 
     name: ClassVar[str] = ""
     defaults: ClassVar[Mapping[str, float]] = {}
 
     def reset(self, context: Context) -> None:
-        """Prepare for a flight. Where vanes measure the gust, `step` subtracts its effect. The context of the
-        detector then declares only the rest of the turbulence."""
+        """Prepare for a flight. Where vanes measure the gust, `step` subtracts its effect from the
+        innovation. The context of the detector then declares only the rest of the turbulence."""
         self.options, self.vane_gust = rival_options(self.name, self.defaults, context), VaneGust(context)
         self.context, self.dt = self.vane_gust.context, context.dt_s
         self.leading = list(context.leading)
@@ -45,7 +46,7 @@ class RivalDetector:
         return verdict._replace(statistic=statistic)
 
     def loss(self, i: int, theta: float, effectiveness: np.ndarray | None = None) -> Verdict:
-        """The verdict that the main surface of axis i has lost effectiveness, theta."""
+        """The verdict that the main surface of axis i has lost effectiveness; theta: size, -1 to 0."""
         name = self.context.leaders[i]
         return Verdict(True, "pqr"[i], name, "loss_of_effectiveness", theta, effectiveness)
 
@@ -61,5 +62,5 @@ class RivalDetector:
         """Prepare at the alarm, before the first `isolate`."""
 
     def isolate(self, measured: Measured) -> Verdict:
-        """The verdict of a frame from the alarm on."""
+        """The verdict of a frame from the alarm on; its `detected` is True."""
         raise NotImplementedError

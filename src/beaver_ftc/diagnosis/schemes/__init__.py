@@ -39,7 +39,7 @@ from beaver_ftc.scenario.pairs import pairs_refused
 
 @sized
 def fdi_dtype(n: int, size: StatisticalSize = USUAL_SIZE) -> np.dtype:
-    """The stages of the diagnosis of an aircraft with n surfaces; size: rooms of the
+    """The stages of the diagnosis of an aircraft with n surfaces; size: capacities of the
     statistical detector's record."""
     return record(
         config=state.SHARED_CONFIG_RECORD, bound=bound_dtype(n, size.n_map_boxes), bank=filters.BANK_RECORD,
@@ -52,9 +52,10 @@ def fdi_dtype(n: int, size: StatisticalSize = USUAL_SIZE) -> np.dtype:
 
 
 def configure_diagnosis(fdi: np.void, pred: np.void, declared: Declared, travel: np.ndarray) -> None:
-    """Fill in the stages of the diagnosis; pred: already filled in. travel (2, n) rad: the stops.
+    """Fill in the stages of the diagnosis that need no trim; pred: already filled in. travel (2, n) rad: the
+    stops.
 
-    Raises BadInput where a change in flight declares errors with which pairs are not available.
+    Raises BadInput if pairs are asked for and the declared errors of the sensors do not allow them.
     """
     config, aircraft, dt = declared.fdi, declared.aircraft, 1.0 / declared.rate_hz
     rows = isolation.list_estimators(config.fault_class, aircraft)
@@ -76,10 +77,8 @@ def configure_diagnosis(fdi: np.void, pred: np.void, declared: Declared, travel:
 
 def prepare_takeover(fdi: np.void, in_flight: bool) -> None:
     """Prepare a configured diagnosis to take over from another one in the same flight. No state of that one
-    continues.
-
-    in_flight: whether the air already moves. The first JSBSim frame of the sensor monitor then begins a frame
-    of the loop.
+    continues, and the next sample of the sensor monitor is the first of a frame of the loop. in_flight:
+    whether the air already moves.
     """
     for name in ("gust", "vaneless", "vaned"):
         memory = fdi["statistical"][name]["memory"]

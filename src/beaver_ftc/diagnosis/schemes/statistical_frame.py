@@ -1,11 +1,12 @@
 """How the statistical detector is brought to a frame, in the order of the calls:
 
-add_gust_instant    each JSBSim frame inside: the gust that the vanes measure, and its effect
+add_gust_instant    each JSBSim frame inside: the gust that the vanes measure, its effect, rows of the rates
 update_tests        at its end: the innovation against every hypothesis
 prepare_gusts       then for the next frame: gust estimates, rows of the forces, noise, coefficients
 
 fdi             record of `schemes.fdi_dtype`
-pred, meas      prediction of the design model, readings of the sensors
+prediction      of the design model (pred)
+measured        readings of the sensors (meas)
 k, t            number of the frame; its time, s
 """
 
@@ -23,7 +24,8 @@ from beaver_ftc.diagnosis.monitors import gyro_or_attitude
 @apart(long_loops=True)
 def update_tests(fdi, prediction, measured, k, t):
     """Test the innovation of the elapsed frame, which ends at frame k, t s, for every hypothesis: in the
-    blocks of the rates, against the attitude, and in the parity views."""
+    blocks of the rates, against the attitude, and in the parity views. Then update the alarm, and filter for
+    the law the innovation after known faults."""
     stat, y, dt = fdi.statistical, measured.y, fdi.config.dt
     alarmed = stat.alarm.detected_at_s >= 0.0
     fill_rows(fdi, prediction, y)
@@ -64,7 +66,8 @@ def compare_attitude(fdi, x):
 
 @apart(long_loops=True)
 def prepare_gusts(fdi, prediction, measured, k):
-    """Prepare the tests of the frame after frame k: the gust that the vanes measure, noise, coefficients."""
+    """Prepare the tests of the frame after frame k: gust estimates, rows of the forces, noise,
+    coefficients."""
     stat, dt = fdi.statistical, fdi.config.dt
     update_gusts(stat, fdi.bound.declared_errors.du, prediction, measured, k, dt)
     statistical.prepare_tests(stat, fdi.bound, prediction.design, measured, prediction.u, dt)
@@ -72,7 +75,8 @@ def prepare_gusts(fdi, prediction, measured, k):
 
 @apart(long_loops=True)
 def add_gust_instant(fdi, prediction, measured):
-    """Add an instant inside a frame to the gust that the vanes measure, and to its effect on the aircraft."""
+    """Add an instant inside a frame to the gust that the vanes measure, its effect, and the rows of the
+    rates."""
     h = prediction.w * fdi.config.dt
     statistical.add_test_instant(fdi.statistical, fdi.bound, prediction.design, measured, prediction.u, h)
 
@@ -100,8 +104,8 @@ def update_gusts(stat, du, pred, meas, k, dt):
 
 @kernel
 def step_view_gust(gust, y, pred, meas, k, dt):
-    """Update a gust estimate by accelerometers that the views alone use, once a frame; y (5,) with its flow
-    angles."""
+    """Update, once a frame, a gust estimate by accelerometers that the views alone use; y (N_Y,): readings
+    with the flow angles to be used."""
     gust.memory.f_read = meas.force
     gusts.set_intensity(gust, meas.altitude)
     gusts.step_gust(gust, y, meas.attitude, dt, k)

@@ -32,13 +32,13 @@ def loss_limits(excluded: np.ndarray, frames: int, dt: float) -> Document:
 
     excluded (n,): smallest loss, 0 to 1, for which the frame alone excludes the other surface; infinite where
     no loss does. frames: number of frames within which the other surface has to be excluded. dt: length of a
-    frame, s. A delay includes the frame in which the loss begins. next_exclusion (n,): from each frame on,
-    the first frame in which a total loss excludes the other surface; n if there is none. A loss begins at
-    least `frames` before the end.
+    frame, s. A delay includes the frame in which the loss begins. A loss begins at least `frames` before the
+    end.
     """
     smallest = least_in_window(excluded, frames)
     n = len(excluded)
     own = np.where(excluded <= 1.0, np.arange(n), n)
+    # From each frame on: the first frame in which a total loss excludes the other surface, or n.
     next_exclusion = np.minimum.accumulate(own[::-1])[::-1]
     delay_s = np.where(next_exclusion < n, (next_exclusion - np.arange(n) + 1) * dt, inf)
     limits = (*largest_and_median(smallest), *largest_and_median(delay_s[: len(smallest)]))
@@ -46,7 +46,7 @@ def loss_limits(excluded: np.ndarray, frames: int, dt: float) -> Document:
 
 
 def least_in_window(values: np.ndarray, frames: int) -> np.ndarray:
-    """The smallest of each window of so many values (n,), (n - frames + 1,)."""
+    """The smallest of each `frames` successive values: (n,) to (n - frames + 1,); frames: at most n."""
     return np.lib.stride_tricks.sliding_window_view(values, frames).min(axis=1)
 
 
@@ -58,7 +58,7 @@ def largest_and_median(values: np.ndarray, most: float = inf) -> list[float | No
 
 
 def smallest_doublets(scenario: Scenario, after_s: float) -> dict[tuple[str, str], Document]:
-    """By pair of surfaces: the doublet, flown after_s into a healthy flight, that distinguishes
+    """By (faulty, other surface): the doublet, flown after_s into a healthy flight, that distinguishes
     losses of DISTINGUISHED_LOSS of the two; or why there is none."""
     find = offered("doublets")
     pairs = permutations(scenario.airframe.class_of_losses, 2)

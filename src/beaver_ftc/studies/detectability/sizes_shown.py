@@ -50,7 +50,8 @@ def _sentences(document: Document) -> Iterator[str]:
     yield from _sizes(document)
     yield from _doubts(document)
     better = [row for row in document["compared"] if _is_better(row, document)]
-    references = [row for row in better if "reference" in row["variant"]]  # as sizes.py names these alone
+    # variants.py has this word in the names of references alone
+    references = [row for row in better if "reference" in row["variant"]]
     left_out = [row for row in better if row not in references]
     no_difference = "makes a difference outside of the intervals"
     limit = _effect(left_out, f"nothing that was left out alone {no_difference}")
@@ -60,7 +61,7 @@ def _sentences(document: Document) -> Iterator[str]:
 
 
 def _sizes(document: Document) -> Iterator[str]:
-    """A sentence about the size that is certain, and one about the size that most flights find."""
+    """A sentence about the size that is certain, and one about that which a given share of flights find."""
     certain, frequent, total, surface = (
         document[key] for key in ("certain", "found", "total_loss", "surface")
     )
@@ -101,9 +102,9 @@ def _doubts(document: Document) -> Iterator[str]:
 
 
 def _is_better(variant: Document, document: Document) -> bool:
-    """Whether a variant finds smaller losses than the scenario as it is, so that the intervals do not
-    overlap. If the scenario finds no loss often enough: the same of the shares in which a total loss is
-    found."""
+    """Whether a variant finds smaller losses than the scenario as it is: its interval ends below that of the
+    scenario. If the scenario finds no loss often enough, the shares in which a total loss is found are
+    compared instead: the interval of the variant begins above that of the scenario."""
     size = variant["found"]
     base = document["found"]
     if base["size"] is None:

@@ -13,8 +13,8 @@ Rows = Sequence[Document]  # rows of flights
 
 
 def document_of(rows: Rows) -> Document:
-    """The document of the matrix: cells, flights, wrong names and false alarms, and aircraft that only our
-    law lost."""
+    """The document of the matrix: cells, flights, those with the verdict WRONG, false alarms (which are among
+    them), and aircraft that only our law lost."""
     wrong = values_of(rows, "verdict").count("WRONG")
     false_alarms = sum_of(rows, "false_alarm")
     informed = [row for row in rows if "told_chance" in row]
@@ -56,8 +56,9 @@ def informed_counts(rows: Rows) -> Document:
     """The results of the flights in which the informed test detects the fault with a probability above
     LIKELY.
 
-    named: the right surface is named. type_kept: of the detected faults, surface and type are named or not
-    excluded. Of all flights: flights, and detected_but_not_told, those that only the diagnosis detects.
+    seen: these flights. detected: those of them with an alarm, true or false. named: the right surface is
+    named. type_kept: of the detected flights, those without the verdict WRONG. Of all flights: flights, and
+    detected_but_not_told, those with an alarm whose fault the informed test does not detect.
     """
     seen = _detectable(rows)
     detected = [row for row in seen if row["detected"]]

@@ -6,7 +6,7 @@
     not borne out    the number does not keep its limit
     stronger         it is also borne out in each setting that the paper did not fly; there a statement that
                      is true by the construction of the code must only hold
-    cannot be judged it holds also in its ablation, or there is nothing to measure (reproduction.py)
+    cannot be judged it holds also in its ablation, or there is nothing to measure (judged.py)
 
 A number that keeps its limit does not yet show that the mechanism is the reason. Statements that are true by
 the construction of the code are counted separately.
@@ -99,7 +99,7 @@ class Claim(NamedTuple):
 
     def verdict(self, number: float, without: float, elsewhere: Sequence[tuple[float, float]]) -> str:
         """One of VERDICTS. number: in the published setting. without: in its ablation. elsewhere: both
-        numbers in each setting that the paper did not fly (ELSEWHERE of reproduction.py); empty for a claim
+        numbers in each setting that the paper did not fly (ELSEWHERE of cases.py); empty for a claim
         with `because`. A statement that is true by construction must only hold there."""
         if not self.holds(number):
             return NOT_BORNE_OUT

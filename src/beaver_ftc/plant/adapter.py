@@ -120,7 +120,7 @@ FT_PER_M = 1.0 / M_PER_FT
 _LONGEST_REASON = 300
 PA_PER_PSF = N_PER_LBF / M_PER_FT**2
 
-_AT_REST = str(data_root() / "aircraft" / "at_rest.xml")
+_AT_REST = data_root() / "aircraft" / "at_rest.xml"
 
 # betadot enters the side force with the value of the previous run; each further run at the same state
 # divides the error by more than 100 (CY_betadot qdyn S b / 2 m V^2 is at most 0.01), so five leave nothing
@@ -367,7 +367,7 @@ class Plant:
 
     def forget_conditions(self) -> None:
         """Let the initial conditions be those of an aircraft nobody has placed yet."""
-        self.fdm.load_ic(_AT_REST, False)
+        self.fdm.load_ic(str(_AT_REST), False)
 
     def _drift(self, state: FlightState, wind_mps: Sequence[float]) -> None:
         """Let the air, and the aircraft with it, move over the ground.

@@ -25,10 +25,8 @@ from tools.mutants.reach import Reach, digests, kept_file, known
 from tools.mutants.scope import COMPILED, PLAIN, ROOT, SOURCES, tests
 from tools.mutants.trial import SURVIVED, in_a_child, processor_s, pytest_quietly, turn_to
 
-SLOW_S = {
-    PLAIN: 40.0,
-    COMPILED: 10.0,
-}  # of processor, counting lines; a test that takes longer is none for this
+# Of processor, counting lines; a test that takes longer is none for this.
+SLOW_S = {PLAIN: 40.0, COMPILED: 25.0}
 WAITS_S = 120.0  # nor is what waits so long, for other processes
 HANGS_S = 900.0  # of processor for the tests of one file, far more than the limits allow
 EXAMPLES = 4
@@ -47,7 +45,7 @@ def reach(mode: str, jobs: int, say: Callable[[str], None]) -> Reach:
             for file, lost in zip(due, pool.map(_measure, [mode] * len(due), due), strict=True):
                 if lost:
                     say(f"{file.relative_to(ROOT)}: its tests could not be measured, and are left out")
-    return Reach(known for file in files if (known := known(mode, file)))
+    return Reach(found for file in files if (found := known(mode, file)))
 
 
 def _load(mode: str) -> None:

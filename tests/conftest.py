@@ -105,9 +105,9 @@ def changed(request):
     """
     file = Path(request.node.path).relative_to(Path(__file__).parent).with_suffix("")
 
-    def differences(document, part=""):
+    def differences(document, part="", **tolerance):
         name = request.node.name.replace("/", "-") + (f"-{part}" if part else "")
-        return kept.differences(f"{file}/{name}", document, request.config.getoption("--keep"))
+        return kept.differences(f"{file}/{name}", document, request.config.getoption("--keep"), **tolerance)
 
     return differences
 

@@ -7,6 +7,7 @@ before they were kept. `pytest --keep` writes anew what differs; read the differ
 import json
 import re
 from collections.abc import Callable, Iterator, Mapping
+from decimal import Decimal
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ import numpy as np
 
 FOLDER = Path(__file__).with_name("kept")
 RELATIVE, ABSOLUTE, DIGITS = 1e-6, 1e-9, 9
+_ROUNDED = re.compile(r"\d+\.\d+(?:e[+-]?\d+)?|\d+e[+-]?\d+")
 _EMBEDDED = re.compile(r"data:[a-z/+-]+;base64,[A-Za-z0-9+/=]+")
 TOLD: list[Callable[[str, Any, Any, float | None], None]] = []
 """Who is told of each kept value that is not found again to the last digit: its path, what is kept, what is
@@ -23,11 +25,12 @@ found, and the difference of two numbers as a share of the tolerance.
 _INNERMOST = re.compile(r"\[\n[^\[\]{}]*\n *\]")  # lists of numbers or words, as JSON writes them
 
 
-def differences(name: str, found: Any, anew: bool = False) -> list[str]:
-    """From the document kept under this name. anew: keep this one instead."""
+def differences(name: str, found: Any, anew: bool = False, relative: float = RELATIVE) -> list[str]:
+    """From the document kept under this name. anew: keep this one instead. relative: the tolerance of a
+    number."""
     file, found = FOLDER / f"{name}.json", _plain(found)
     if anew:
-        if not file.exists() or any(_differences(json.loads(file.read_text()), found)):
+        if not file.exists() or any(_differences(json.loads(file.read_text()), found, relative)):
             file.parent.mkdir(parents=True, exist_ok=True)
             file.write_text(
                 _INNERMOST.sub(_on_a_line, json.dumps(found, indent=1, ensure_ascii=False)) + "\n"
@@ -35,7 +38,7 @@ def differences(name: str, found: Any, anew: bool = False) -> list[str]:
         return []
     if not file.exists():
         return [f"{name}: nothing is kept; pytest --keep"]
-    return list(_differences(json.loads(file.read_text()), found, name))
+    return list(_differences(json.loads(file.read_text()), found, relative, name))
 
 
 class Fields(dict[str, Any]):
@@ -62,18 +65,20 @@ def _plain(value: Any) -> Any:
     return value if isinstance(value, int | None) else str(value)
 
 
-def _differences(kept: Any, found: Any, path: str = "", size: float = 0.0) -> Iterator[str]:
+def _differences(kept: Any, found: Any, relative: float, path: str = "", size: float = 0.0) -> Iterator[str]:
     """size: of the largest number beside it, in the unit of the number."""
     if isinstance(kept, dict) and isinstance(found, dict):
         for key in kept | found:
             absent = _zero(kept.get(key, found.get(key))) if isinstance(found, Fields) else "-"
-            yield from _differences(kept.get(key, absent), found.get(key, absent), f"{path}.{key}")
+            yield from _differences(kept.get(key, absent), found.get(key, absent), relative, f"{path}.{key}")
     elif isinstance(kept, list) and isinstance(found, list) and len(kept) == len(found):
         size = max((abs(one) for one in kept if isinstance(one, float) and isfinite(one)), default=0.0)
         for i, (before, now) in enumerate(zip(kept, found, strict=True)):
-            yield from _differences(before, now, f"{path}[{i}]", size)
+            yield from _differences(before, now, relative, f"{path}[{i}]", size)
     elif kept != found or type(kept) is not type(found):
-        share = _share(kept, found, size)
+        if isinstance(kept, str) and isinstance(found, str) and _reads_the_same(kept, found):
+            return
+        share = _share(kept, found, size, relative)
         for told in TOLD:
             told(path, kept, found, share)
         if share is None or share > 1.0:
@@ -89,11 +94,21 @@ def _zero(like: Any) -> Any:
     return type(like)(0)
 
 
-def _share(kept: Any, found: Any, size: float) -> float | None:
+def _reads_the_same(kept: str, found: str) -> bool:
+    """Whether two texts differ in nothing but numbers with a point or an exponent, each of these by at most
+    a unit of the last digit, or ABSOLUTE.
+    """
+    if _ROUNDED.sub("", kept) != _ROUNDED.sub("", found):
+        return False
+    pairs = zip(map(Decimal, _ROUNDED.findall(kept)), map(Decimal, _ROUNDED.findall(found)), strict=True)
+    return all(abs(a - b) <= max(Decimal(10) ** a.as_tuple().exponent, Decimal(ABSOLUTE)) for a, b in pairs)
+
+
+def _share(kept: Any, found: Any, size: float, relative: float) -> float | None:
     """The difference as a share of the tolerance; None if these are not two numbers."""
     if not (isinstance(kept, float) and isinstance(found, float)):
         return None
-    return abs(kept - found) / max(ABSOLUTE * max(1.0, size), RELATIVE * max(abs(kept), abs(found)))
+    return abs(kept - found) / max(ABSOLUTE * max(1.0, size), relative * max(abs(kept), abs(found)))
 
 
 def in_short(array: Any) -> list[float]:

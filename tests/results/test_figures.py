@@ -8,19 +8,6 @@ from beaver_ftc.results.series import series_of
 from beaver_ftc.results.style import LOOKS, marks
 from beaver_ftc.results.views import views
 
-EVERY = {
-    "candidates", "tracking", "surfaces", "detection", "isolation", "ratio", "effectiveness", "supervisor",
-    "states",
-}  # fmt: skip
-
-
-def test_every_view_becomes_a_picture_with_its_closeups(log_path, found, tmp_path):
-    files = [picture.path for picture in pictures_of(log_path, found, tmp_path)]
-    assert {file.stem for file in files if "closeup" not in file.stem} == EVERY
-    assert {file.stem for file in files if "closeup" in file.stem} == {
-        "detection-closeup", "candidates-closeup", "isolation-closeup",
-    }  # fmt: skip
-
 
 @pytest.mark.parametrize("kind", ["png", "pdf", "svg"])
 def test_the_same_flight_gives_the_same_bytes(log_path, found, tmp_path, kind):
@@ -39,13 +26,6 @@ def panels(log_path, found):
     return lambda name: (
         draw(known[name], series_of(StoredLog(log_path), known[name].columns), marks(found), "x").axes
     )
-
-
-@pytest.mark.parametrize("name", ["tracking", "surfaces", "detection"])
-def test_instants_are_marked_in_every_panel(panels, found, name):
-    for axes in panels(name):
-        at = {line.get_xdata()[0] for line in axes.lines if line.get_marker() in ("v", "D", "s")}
-        assert at == {12.0, found.detection.time_s, found.isolation.time_s}
 
 
 def test_degrees_are_shown_and_said_and_a_threshold_on_both_sides(panels, log_path):

@@ -20,18 +20,6 @@ def flown():
     return small.flight(MODEL, 300, lost=((1, 40, 120, 0.5),)), rows
 
 
-def test_a_flight_in_a_picture(flown):
-    """Where the alarm is, and the effectiveness that the bounds leave of each surface, at most one."""
-    samples, rows = flown
-    *shown, right, left = pages.flight_figure(samples, rows, pages.words_of_model(MODEL)).axes
-    said = [axes.get_ylabel().replace("\n", " ") for axes in (*shown, right, left)]
-    assert said == ["rates, deg/s", "healthy surfaces' share of travel", "probability",
-                    "right effectiveness", "left effectiveness"]  # fmt: skip
-    assert {len(axes.patches) for axes in (*shown, right, left)} == {2}  # an area an alarm
-    assert [line.get_label() for line in shown[0].lines] == ["p", "q", "r"]
-    assert [axes.lines[0].get_ydata().max() for axes in (right, left)] == pytest.approx([1.0, 1.0], abs=0.05)
-
-
 def rendered(samples, rows, verdict):
     words = pages.words_of_model(MODEL)
     return pages.render_diagnosis(samples, rows, verdict, words)

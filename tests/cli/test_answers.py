@@ -1,0 +1,56 @@
+"""What each command answers, in words, as a document, on pages and in figures, is what was kept of it."""
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+import yaml
+from matplotlib.figure import Figure
+
+from commands import beaver
+from drawn_figures import shown
+from kept import page
+
+GIVEN = yaml.safe_load((Path(__file__).parents[1] / "data" / "answers.yaml").read_text())
+KEPT = (".html", ".json", ".md")
+# Dates, digests, and what pages have to look well.
+APART = re.compile(r"\d{4}-\d\d-\d\d \d\d:\d\d UTC|\b[0-9a-f]{64}\b|<(style|script)\b.*?</\1>", re.DOTALL)
+
+
+@pytest.fixture
+def figures(monkeypatch):
+    """What each figure shows that is saved, by file name. One process does everything, and takes no time."""
+    found, save = {}, Figure.savefig
+
+    def saved(figure, to, **options):
+        found[getattr(to, "name", f"{len(found)}")] = shown(figure)
+        save(figure, to, **options | {"dpi": 10})
+
+    monkeypatch.setattr(Figure, "savefig", saved)
+    monkeypatch.setattr("os.sched_getaffinity", lambda _: {0})
+    monkeypatch.setattr("beaver_ftc.studies.compare.trial.thread_time", lambda: 0.0)
+    return found
+
+
+@pytest.mark.parametrize("name", GIVEN["answers"])
+def test_an_answer_says_and_shows_what_is_kept(name, figures, changed, tmp_path):
+    for file, text in GIVEN["files"].items():
+        (tmp_path / file).write_text(text)
+    said = [beaver(*line.split(), cwd=tmp_path) for line in GIVEN["answers"][name]]
+    written = sorted(file for file in tmp_path.rglob("*.*") if file.name not in GIVEN["files"])
+    assert not changed(
+        {
+            "said": [[one.returncode, *_read(one.stdout)] for one in said],
+            "written": {file.name: _read(file.read_text()) for file in written if file.suffix in KEPT},
+            "files": [file.name for file in written],
+            "figures": figures,
+        },
+        relative=1e-4,
+    )
+
+
+def _read(text):
+    """The lines of a text, or its document."""
+    text = APART.sub("", text)
+    return [json.loads(text)] if text.startswith("{") else page(text)

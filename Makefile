@@ -27,7 +27,7 @@ PLAIN := tests/design $(wildcard tests/*/test_*_kernels.py tests/*/*/test_*_kern
 
 help:
 	@echo "make demo       set up, fly the published elevator case, print the verdict and where the report lies"
-	@echo "make check      the tests that execute the lines you changed: a minute at most"
+	@echo "make check      the tests nearest to the modules you changed: a minute at most"
 	@echo "make test       set up and run every test of every day"
 	@echo "make nightly    all tests with all that they draw, browsers, notebooks, pages, costs, drawn scenarios, mutants"
 	@echo "make core-test  the core's tests, in a copy without the products"

@@ -1,69 +1,67 @@
-"""`python -m tools.check`: the tests that execute the lines you have changed, the quickest first.
+"""`python -m tools.check`: within a minute, the tests nearest to the modules that you have changed.
 
-Which test executes which line is what `python -m tools.mutants` has found out (`.mutants/`): of the sources
-as they were then, so line numbers are those before the change. Test files that you have changed run as well.
+Test files that you have changed run first, then those of the folders that mirror the modules'. What a minute
+leaves no time for is skipped, and counted.
 """
 
 import os
-import re
 import subprocess
 import sys
-from collections.abc import Iterable, Iterator
+import time
+from pathlib import Path
 
-from tools.mutants.reach import Reach, kept_so_far
-from tools.mutants.scope import COMPILED, PLAIN, ROOT, tests
+import pytest
 
-BUDGET_S = 50.0  # of processor, as measured before
-_HUNK = re.compile(r"^@@ -(\d+)(?:,(\d+))? ")
+from tools.mutants.scope import BY_DAY, COMPILED, PLAIN, ROOT, SOURCES, TESTS, nearest, plain
+
+BUDGET_S = 50.0
+RUN = (
+    sys.executable,
+    "-m",
+    "pytest",
+    "-q",
+    "-n",
+    "2",
+    "--dist",
+    "loadfile",
+    "-p",
+    "tools.check",
+    "-m",
+    BY_DAY,
+)
+_BEGAN = "BEAVER_FTC_CHECK_BEGAN"  # when the whole check began, s since the epoch
 
 
-def changed(diff: str) -> Iterator[tuple[str, list[int]]]:
-    """The files of `git diff -U0`, each with the lines that a change takes the place of or follows."""
-    name, lines = "", list[int]()
-    for line in diff.splitlines():
-        if line.startswith("--- "):
-            if name:
-                yield name, lines
-            name, lines = line.removeprefix("--- a/"), []
-        elif found := _HUNK.match(line):
-            first, count = int(found[1]), int(found[2] or 1)
-            lines += range(first, first + max(count, 1))
-    if name:
-        yield name, lines
+def pytest_runtest_setup() -> None:
+    """In the child, as a plug-in of pytest: skip what there is no time for."""
+    if time.time() - float(os.environ[_BEGAN]) > BUDGET_S:
+        pytest.skip("a minute is over")
 
 
-def chosen(reach: Reach, files: Iterable[tuple[str, list[int]]], budget_s: float) -> list[str]:
-    """The tests that execute these lines, the quickest first, as far as the budget goes."""
-    found = {test for name, lines in files for line in lines for test in reach.of(name, [line])}
-    taken, spent = [], 0.0
-    for test in sorted(found, key=lambda test: (reach.seconds[test], test)):
-        spent += reach.seconds[test]
-        if spent > budget_s:
-            break
-        taken.append(test)
-    return taken
+def changed() -> list[Path]:
+    """The modules and test files that differ from the last commit, new ones too."""
+    listed = ["git", "status", "--porcelain", "--no-renames", "--untracked-files=all", "--", "src", "tests"]
+    said = subprocess.run(listed, cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    found = [ROOT / line[3:].strip('"') for line in said.splitlines()]
+    return [file for file in found if file.suffix == ".py" and file.exists()]
 
 
 def main() -> int:
     """Run them, plain kernels and compiled ones apart; exit status 1 if one fails."""
-    command = ["git", "diff", "-U0", "--no-renames", "HEAD", "--", "src", "tests"]
-    diff = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
-    files = list(changed(diff))
-    if not (ROOT / ".mutants").exists():
-        print(
-            "no map of lines yet: `make mutants` makes it; running changed test files alone", file=sys.stderr
-        )
-    failed = False
-    for mode in (PLAIN, COMPILED):
-        sources = [(name, lines) for name, lines in files if name.startswith("src/")]
-        taken = chosen(kept_so_far(mode), sources, BUDGET_S / 2)
-        of_mode = {file.relative_to(ROOT).as_posix() for file in tests(mode)}
-        taken += [name for name, _ in files if name in of_mode and (ROOT / name).exists()]
-        print(f"{mode}: {len(taken)} tests and files", flush=True)
-        if taken:
-            environment = os.environ | {"NUMBA_DISABLE_JIT": "1" if mode == PLAIN else "0"}
-            run = [sys.executable, "-m", "pytest", "-q", "-n", "2", "--dist", "loadfile", *taken]
-            failed |= subprocess.run(run, cwd=ROOT, env=environment, check=False).returncode not in (0, 5)
+    files = changed()
+    tests = {file for file in files if file.is_relative_to(TESTS) and file.name.startswith("test_")}
+    near = {test for file in files if file.is_relative_to(SOURCES) for test in nearest(file)}
+    environment, failed = os.environ | {_BEGAN: str(time.time())}, False
+    for some in (tests, near - tests):
+        for mode, of_mode in ((PLAIN, some & plain()), (COMPILED, some - plain())):
+            if of_mode:
+                print(f"{mode}: {len(of_mode)} files", flush=True)
+                command = [*RUN, *sorted(map(str, of_mode))]
+                environment["NUMBA_DISABLE_JIT"] = str(int(mode == PLAIN))
+                failed |= subprocess.run(command, cwd=ROOT, env=environment, check=False).returncode not in (
+                    0,
+                    5,
+                )
     return int(failed)
 
 

@@ -46,7 +46,7 @@ def test_an_answer_says_and_shows_what_is_kept(name, figures, changed, tmp_path)
             "files": [file.name for file in written],
             "figures": figures,
         },
-        relative=1e-4,
+        relative=1e-3,
     )
 
 

@@ -16,9 +16,7 @@ import scipy.optimize
 import scipy.stats
 
 from tools.mutants.making import Mutant
-from tools.mutants.measure import few_examples, reach
-from tools.mutants.reach import Reach
-from tools.mutants.scope import FLOWN, MODES, SOURCES, drawn, flown, left_out, stale
+from tools.mutants.scope import SOURCES, drawn, left_out, stale
 from tools.mutants.trial import HANGS, KILLED, outcome
 
 LEAST = 85.0  # per cent
@@ -36,7 +34,7 @@ def main() -> int:
     _say(f"mutants that can be made: {made}; none of")
     for line in left_out():
         _say(f"  {line}")
-    ends = _trials(taken, _tests({kind for kind, _ in taken}, options.jobs), options)
+    ends = _trials(taken, options.jobs)
     for kind in numbers:
         of = {end: number for (its, end), number in sorted(ends.items()) if its == kind}
         _say(f"{kind}: {', '.join(f'{number} {end.lower()}' for end, number in of.items()) or 'none drawn'}")
@@ -58,28 +56,11 @@ def _say(text: str) -> None:
     print(text, flush=True)
 
 
-def _tests(kinds: set[str], jobs: int) -> dict[str, Reach]:
-    """What the tests of each mode execute that mutants of these kinds need."""
-    modes = dict.fromkeys(mode for kind in kinds for mode in MODES[kind] if mode != FLOWN)
-    found = {mode: reach(mode, jobs, _say) for mode in modes}
-    for mode, tests in found.items():
-        reasons = ", ".join(f"{number} {why}" for why, number in tests.left_out.items())
-        _say(f"{mode}: {len(tests.seconds)} tests take part; left out: {reasons or 'none'}")
-    return found
-
-
-def _trials(
-    taken: list[tuple[str, Mutant]], found: dict[str, Reach], options: argparse.Namespace
-) -> Counter[tuple[str, str]]:
+def _trials(taken: list[tuple[str, Mutant]], jobs: int) -> Counter[tuple[str, str]]:
     """How often mutants of each kind came to each end, tried side by side."""
-    few_examples()
     ends: Counter[tuple[str, str]] = Counter()
-    tests = [
-        {mode: flown(mutant.file) if mode == FLOWN else found[mode].reaching(mutant) for mode in MODES[kind]}
-        for kind, mutant in taken
-    ]
-    with ProcessPoolExecutor(options.jobs, mp_context=get_context("fork")) as pool:
-        done = pool.map(outcome, [mutant for _, mutant in taken], tests)
+    with ProcessPoolExecutor(jobs, mp_context=get_context("fork")) as pool:
+        done = pool.map(outcome, [mutant for _, mutant in taken], [kind for kind, _ in taken])
         for number, ((kind, mutant), end) in enumerate(zip(taken, done, strict=True), 1):
             ends[kind, end] += 1
             _say(f"{number:4d} {kind} {end:7} {_line(mutant)}")

@@ -1,10 +1,11 @@
-"""The modules that get mutants, the test files of each mode, and the mutants that a seed draws."""
+"""The modules that get mutants, the tests that try them, and the mutants that a seed draws."""
 
 import ast
 import hashlib
 import subprocess
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cache
 from itertools import chain, zip_longest
 from pathlib import Path
@@ -23,12 +24,11 @@ EQUIVALENT = Path(__file__).with_name("equivalent.yaml")
 
 KERNELS, GLUE = "kernels", "glue"
 # How tests run: in plain Python, since to compile each mutant of a kernel would take all day; or compiled,
-# once for all, where no kernel changes. A kernel whose mutant no plain test finds is compiled, for the other
-# tests of its folder, and for flights beside the executable reference and beside each other.
-PLAIN, COMPILED, FLOWN = "plain", "compiled", "flown"
+# once for all, where no kernel changes; or compiled anew, if no plain test finds a mutant of a kernel.
+PLAIN, COMPILED, ANEW = "plain", "compiled", "anew"
 FLIGHTS = ("diagnosis/test_short_flights.py", "relations/test_*.py", "reference/test_*.py")
-FILE_S = 30.0  # of processor for a file of tests that fly, roughly
-MODES = {KERNELS: (PLAIN, FLOWN), GLUE: (PLAIN, COMPILED)}
+ANSWERS = TESTS / "cli" / "test_answers.py"
+BY_DAY, EACH_PUSH = "not nightly and not acceptance", "not nightly and acceptance"
 
 # Compiled modules that plain Python reaches in a second.
 QUICK = ("design", "diagnosis", "control")
@@ -97,35 +97,65 @@ def left_out() -> list[str]:
     return [f"{kinds[reason]} modules: {text}" for reason, text in LEFT_OUT.items() if kinds[reason]]
 
 
-def tests(mode: str) -> list[Path]:
-    """The test files of a mode: those that `make test` runs in plain Python, or all others."""
-    plain = {
-        file for entry in _plain() for file in ([entry] if entry.is_file() else entry.rglob("test_*.py"))
-    }
-    if mode == PLAIN:
-        return sorted(plain)
-    return sorted(set(TESTS.rglob("test_*.py")) - plain - set((TESTS / "acceptance").rglob("*.py")))
+@dataclass(frozen=True)
+class Round:
+    """Tests that run together: how, which, with which marks, and without which."""
+
+    mode: str
+    tests: tuple[str, ...]
+    marks: str = ""
+    left_out: tuple[str, ...] = ()
+
+    @property
+    def asked(self) -> list[str]:
+        """What pytest is asked."""
+        marks = ["-m", self.marks] * bool(self.marks)
+        return [*marks, *(f"--deselect={test}" for test in self.left_out), *self.tests]
+
+    def without(self, test: str) -> "Round":
+        """The others."""
+        return replace(self, left_out=(*self.left_out, test))
 
 
-def flown(file: Path) -> dict[str, float]:
-    """The test files that fly a compiled mutant of a module, and their times, s."""
-    own = sorted(set((TESTS / folder_of_tests(file)).glob("test_*.py")) - set(tests(PLAIN)))
-    flights = [path for pattern in FLIGHTS for path in sorted(TESTS.glob(pattern))]
-    return {path.relative_to(ROOT).as_posix(): FILE_S for path in dict.fromkeys([*own, *flights])}
+def rounds(file: Path, kind: str) -> list[Round]:
+    """The tests for a mutant of a module, the nearest first."""
+    near, every = nearest(file), _below(TESTS)
+    flights = {path for pattern in FLIGHTS for path in TESTS.glob(pattern)}
+    if kind == KERNELS:
+        wider = _below(TESTS / file.relative_to(CORE).parts[0])
+        found = [(PLAIN, wider & plain() - flights, BY_DAY), (ANEW, near - plain() | flights, BY_DAY)]
+    else:
+        found = [
+            (PLAIN, near & plain() - flights, BY_DAY),
+            (COMPILED, near - plain(), BY_DAY),
+            (COMPILED, every - near - plain() | flights, BY_DAY),
+            (COMPILED, near - plain() | {ANSWERS}, EACH_PUSH),
+        ]
+    named = [(mode, tuple(sorted(map(str, files))), marks) for mode, files, marks in found]
+    return [Round(mode, names, marks) for mode, names, marks in named if names]
 
 
-def folder_of_tests(file: Path) -> str:
-    """The folder below tests/ that mirrors a module's: `products/NAME` for beaver_ftc_NAME."""
+def nearest(file: Path) -> set[Path]:
+    """The test files below the folder that mirrors a module's: tests/products/NAME of beaver_ftc_NAME."""
     package, _, folder = file.relative_to(SOURCES).parent.as_posix().partition("/")
     product = package.removeprefix(CORE.name).removeprefix("_")
-    return "/".join(part for part in ("products" if product else "", product, folder) if part)
+    place = TESTS / ("products" if product else "") / product / folder
+    while not place.is_dir():
+        place = place.parent
+    return _below(place) if place != TESTS else set(TESTS.glob("test_*.py"))
+
+
+def _below(folder: Path) -> set[Path]:
+    return set(folder.rglob("test_*.py")) - set((TESTS / "acceptance").glob("*.py"))
 
 
 @cache
-def _plain() -> list[Path]:
+def plain() -> frozenset[Path]:
+    """The test files that `make test` runs in plain Python."""
     asked = ["make", "--silent", "plain"]
     done = subprocess.run(asked, capture_output=True, text=True, check=True, cwd=ROOT)
-    return [ROOT / name for name in done.stdout.split()]
+    entries = [ROOT / name for name in done.stdout.split()]
+    return frozenset(file for entry in entries for file in ([entry] if entry.is_file() else _below(entry)))
 
 
 def drawn(seed: int, patterns: Sequence[str]) -> tuple[list[tuple[str, Mutant]], Counter[str]]:

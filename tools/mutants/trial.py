@@ -1,7 +1,6 @@
-"""The trial of a mutant: a copy of the package with the mutant in it, and the tests that reach it."""
+"""The trial of a mutant: a copy of the packages with the mutant in it, and the tests nearest to it first."""
 
 import contextlib
-import math
 import os
 import signal
 import sys
@@ -15,74 +14,50 @@ import numba
 import pytest
 
 from tools.mutants.making import Mutant
-from tools.mutants.scope import COMPILED, CORE, FLOWN, KEPT, PLAIN, ROOT, SOURCES, folder_of_tests
+from tools.mutants.scope import COMPILED, CORE, KEPT, PLAIN, ROOT, SOURCES, Round, rounds
 
-# Of tests for one mutant, by what they take with the true module. Flown files are run whole, and all of them.
-BUDGET_S = {PLAIN: 90.0, COMPILED: 120.0, FLOWN: math.inf}
-MARKS = {FLOWN: ("-m", "not nightly and not acceptance")}  # of whole files, those by day
-ENDLESS_S, ENDLESS = 30.0, 3.0  # of processor, and times what the tests take with the true module: it hangs
+TEST_S = 120.0  # of processor; a test that takes longer hangs
+ROUND_S = 3000.0  # by the clock: whoever takes longer waits for what never comes
 
-SURVIVED, KILLED, HANGS, UNREACHED = "LIVES", "killed", "hangs", "NO TEST"
+SURVIVED, KILLED, HANGS = "LIVES", "killed", "hangs"
 
 
-def outcome(mutant: Mutant, tests: dict[str, dict[str, float]]) -> str:
-    """KILLED if a test fails with the mutant, and passes, alone, with the true module.
-
-    tests: of each mode the seconds that those take which reach it.
-    """
-    ends = [UNREACHED]
-    for mode, seconds in tests.items():
-        ends.append(_outcome(mutant, mode, seconds))
-        if ends[-1] in (KILLED, HANGS):
-            return ends[-1]
-    return SURVIVED if SURVIVED in ends else UNREACHED
-
-
-def _outcome(mutant: Mutant, mode: str, seconds: dict[str, float]) -> str:
-    """How the tests of a mode end. A test that also fails without the mutant is left out, and the rest run
-    again."""
-    tests = _chosen(mutant.file, seconds, BUDGET_S[mode])
-    while tests:
-        limit_s = ENDLESS_S + ENDLESS * sum(seconds[test] for test in tests)
-        with tempfile.NamedTemporaryFile("r") as note:
-            ended = _run(mode, mutant.file, mutant.source(), tests, Path(note.name), limit_s)
-            failed = note.read().strip()
-        if ended != KILLED or _is_sound(mode, failed):
+def outcome(mutant: Mutant, kind: str) -> str:
+    """KILLED if a test fails with the mutant, and passes, alone, with the true module."""
+    for tests in rounds(mutant.file, kind):
+        ended = _outcome(mutant, tests)
+        if ended != SURVIVED:
             return ended
-        if failed not in tests:  # one of a file, which fails without the mutant too
-            return SURVIVED
-        tests.remove(failed)
-    return UNREACHED
+    return SURVIVED
 
 
-def _chosen(file: Path, seconds: dict[str, float], budget_s: float) -> list[str]:
-    """The tests within a budget: those of the folder of the module first, quick ones before slow ones."""
-    own = f"tests/{folder_of_tests(file)}/"
-    taken, spent = [], 0.0
-    for test in sorted(seconds, key=lambda test: (not test.startswith(own), seconds[test])):
-        spent += seconds[test]
-        if spent > budget_s and taken:
-            break
-        taken.append(test)
-    return taken
+def _outcome(mutant: Mutant, tests: Round) -> str:
+    """How the tests of a round end. One that also fails without the mutant is left out, and the rest run
+    again."""
+    while True:
+        with tempfile.NamedTemporaryFile("r") as note:
+            ended = _run(tests, mutant.file, mutant.source(), Path(note.name))
+            failed = note.read().strip()
+        if ended != KILLED or not failed or _is_sound(tests.mode, failed):  # none: it cannot be imported
+            return ended
+        tests = tests.without(failed)
 
 
 @cache
 def _is_sound(mode: str, test: str) -> bool:
     """Whether a test passes alone with the true package, put in place as one with a mutant is."""
-    if not test:
-        return True  # none was run: the mutant cannot be imported
     true = CORE / "__init__.py"
-    return _run(mode, true, true.read_text(), [test], Path(os.devnull), 1000.0) == SURVIVED
+    return _run(Round(mode, (test,)), true, true.read_text(), Path(os.devnull)) == SURVIVED
 
 
-def _run(mode: str, file: Path, source: str, tests: list[str], note: Path, limit_s: float) -> str:
+def _run(tests: Round, file: Path, source: str, note: Path) -> str:
     def tried() -> int:
-        turn_to(mode)
-        return pytest_quietly(["-x", *MARKS.get(mode, ()), *tests], [_Note(note)])
+        turn_to(tests.mode)
+        status = pytest_quietly(["-x", *tests.asked], [_Note(note)])
+        return 0 if status == pytest.ExitCode.NO_TESTS_COLLECTED else status
 
     with _instead(file, source):
-        return in_a_child(tried, limit_s)
+        return in_a_child(tried)
 
 
 @contextlib.contextmanager
@@ -122,45 +97,39 @@ def _first(folder: str) -> Iterator[None]:
 def turn_to(mode: str) -> None:
     """Let this process, and those that it starts, compile kernels, or run them as plain Python."""
     os.environ["NUMBA_DISABLE_JIT"] = "1" if mode == PLAIN else "0"
-    if mode == FLOWN:
+    if mode != COMPILED:
         os.environ["XDG_CACHE_HOME"] = str(KEPT / "cache")  # the user's is for true code
     numba.config.reload_config()
 
 
-def processor_s() -> float:
-    """Processor time of this process and of those that it has started, s."""
-    return sum(os.times()[:4])
-
-
-def in_a_child(work: Callable[[], int], limit_s: float) -> str:
-    """SURVIVED if `work` returns 0, KILLED if it returns another status, HANGS if it exceeds the limit of
-    processor time.
+def in_a_child(work: Callable[[], int]) -> str:
+    """SURVIVED if `work` returns 0, KILLED if it returns another status, HANGS if a test or the whole takes
+    too long.
 
     The child process has the libraries loaded already. Processes that a test has started end with it.
     """
     child = os.fork()
     if child == 0:
         os.setpgid(0, 0)  # a group of its own
-        _work(work, limit_s)  # does not return
+        _work(work)  # does not return
     try:
-        return _end(child, 5 * limit_s)
+        return _end(child)
     finally:
         with contextlib.suppress(ProcessLookupError):
             os.killpg(child, signal.SIGKILL)
 
 
-def _work(work: Callable[[], int], limit_s: float) -> None:
+def _work(work: Callable[[], int]) -> None:
     status = 1
     try:
-        signal.signal(signal.SIGVTALRM, signal.SIG_DFL)
-        signal.setitimer(signal.ITIMER_VIRTUAL, limit_s)  # its signal ends the process
+        signal.signal(signal.SIGVTALRM, signal.SIG_DFL)  # its signal ends the process
         status = work()
     finally:
         os._exit(status)
 
 
-def _end(child: int, wait_s: float) -> str:
-    """Wait for a child process; it hangs if it takes longer than this."""
+def _end(child: int) -> str:
+    """Wait for a child process."""
     started = time.monotonic()
     while True:
         done, status = os.waitpid(child, os.WNOHANG)
@@ -168,7 +137,7 @@ def _end(child: int, wait_s: float) -> str:
             return HANGS if os.WTERMSIG(status) == signal.SIGVTALRM else KILLED
         if done:
             return SURVIVED if os.waitstatus_to_exitcode(status) == 0 else KILLED
-        if time.monotonic() - started > wait_s:  # it waits for what never comes
+        if time.monotonic() - started > ROUND_S:
             os.kill(child, signal.SIGKILL)
             os.waitpid(child, 0)
             return HANGS
@@ -189,10 +158,13 @@ def pytest_quietly(arguments: list[str], plugins: list) -> int:
 
 
 class _Note:
-    """A plug-in that writes the name of a failed test to a file."""
+    """A plug-in that ends a test that hangs, and writes the name of one that fails to a file."""
 
     def __init__(self, file: Path) -> None:
         self._file = file
+
+    def pytest_runtest_logstart(self, nodeid: str) -> None:
+        signal.setitimer(signal.ITIMER_VIRTUAL, TEST_S)
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         if report.failed:

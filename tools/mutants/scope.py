@@ -27,7 +27,7 @@ KERNELS, GLUE = "kernels", "glue"
 # once for all, where no kernel changes; or compiled anew, if no plain test finds a mutant of a kernel.
 PLAIN, COMPILED, ANEW = "plain", "compiled", "anew"
 FLIGHTS = ("diagnosis/test_short_flights.py", "relations/test_*.py", "reference/test_*.py")
-ANSWERS = TESTS / "cli" / "test_answers.py"
+ANSWERS = TESTS / "cli" / "test_kept_answers.py"
 BY_DAY, EACH_PUSH = "not nightly and not acceptance", "not nightly and acceptance"
 
 # Compiled modules that plain Python reaches in a second.

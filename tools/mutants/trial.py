@@ -38,16 +38,21 @@ def _outcome(mutant: Mutant, tests: Round) -> str:
         with tempfile.NamedTemporaryFile("r") as note:
             ended = _run(tests, mutant.file, mutant.source(), Path(note.name))
             failed = note.read().strip()
-        if ended != KILLED or not failed or _is_sound(tests.mode, failed):  # none: it cannot be imported
+        # None has failed if the mutant cannot be imported.
+        if ended != KILLED or _is_sound(
+            tests.mode, (failed,) if failed else ("--collect-only", *tests.tests)
+        ):
             return ended
+        if not failed:
+            raise RuntimeError(f"these tests cannot be collected: {' '.join(tests.tests)}")
         tests = tests.without(failed)
 
 
 @cache
-def _is_sound(mode: str, test: str) -> bool:
-    """Whether a test passes alone with the true package, put in place as one with a mutant is."""
+def _is_sound(mode: str, asked: tuple[str, ...]) -> bool:
+    """Whether tests pass alone with the true package, put in place as one with a mutant is."""
     true = CORE / "__init__.py"
-    return _run(Round(mode, (test,)), true, true.read_text(), Path(os.devnull)) == SURVIVED
+    return _run(Round(mode, asked), true, true.read_text(), Path(os.devnull)) == SURVIVED
 
 
 def _run(tests: Round, file: Path, source: str, note: Path) -> str:

@@ -28,7 +28,8 @@ KERNELS, GLUE = "kernels", "glue"
 PLAIN, COMPILED, ANEW = "plain", "compiled", "anew"
 FLIGHTS = ("diagnosis/test_short_flights.py", "relations/test_*.py", "reference/test_*.py")
 ANSWERS = TESTS / "cli" / "test_kept_answers.py"
-BY_DAY, EACH_PUSH = "not nightly and not acceptance", "not nightly and acceptance"
+NOT_AT_NIGHT = "not nightly"
+BY_DAY, EACH_PUSH = f"{NOT_AT_NIGHT} and not acceptance", f"{NOT_AT_NIGHT} and acceptance"
 
 # Compiled modules that plain Python reaches in a second.
 QUICK = ("design", "diagnosis", "control")
@@ -128,8 +129,9 @@ def rounds(file: Path, kind: str) -> list[Round]:
         found = [
             (PLAIN, near & plain() - flights, BY_DAY),
             (COMPILED, near - plain(), BY_DAY),
-            (COMPILED, every - near - plain() | flights, BY_DAY),
-            (COMPILED, near - plain() | {ANSWERS}, EACH_PUSH),
+            (COMPILED, {ANSWERS}, NOT_AT_NIGHT),
+            (COMPILED, near - plain() - {ANSWERS}, EACH_PUSH),
+            (COMPILED, every - near - plain() - {ANSWERS} | flights, BY_DAY),
         ]
     named = [(mode, tuple(sorted(map(str, files))), marks) for mode, files, marks in found]
     return [Round(mode, names, marks) for mode, names, marks in named if names]

@@ -16,7 +16,8 @@ import scipy.optimize
 import scipy.stats
 
 from tools.mutants.making import Mutant
-from tools.mutants.scope import SOURCES, drawn, left_out, stale
+from tools.mutants.marks import reaching
+from tools.mutants.scope import GLUE, SOURCES, drawn, left_out, stale
 from tools.mutants.trial import HANGS, KILLED, outcome
 
 LEAST = 85.0  # per cent
@@ -59,8 +60,12 @@ def _say(text: str) -> None:
 def _trials(taken: list[tuple[str, Mutant]], jobs: int) -> Counter[tuple[str, str]]:
     """How often mutants of each kind came to each end, tried side by side."""
     ends: Counter[tuple[str, str]] = Counter()
+    kinds, mutants = zip(*taken, strict=True)
+    glue = [mutant for kind, mutant in taken if kind == GLUE]
+    found = dict(zip(glue, reaching(glue, jobs), strict=True))
+    reached = [found.get(mutant, set()) for mutant in mutants]
     with ProcessPoolExecutor(jobs, mp_context=get_context("fork")) as pool:
-        done = pool.map(outcome, [mutant for _, mutant in taken], [kind for kind, _ in taken])
+        done = pool.map(outcome, mutants, kinds, reached)
         for number, ((kind, mutant), end) in enumerate(zip(taken, done, strict=True), 1):
             ends[kind, end] += 1
             _say(f"{number:4d} {kind} {end:7} {_line(mutant)}")

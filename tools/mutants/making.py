@@ -1,8 +1,8 @@
 """The mutants of a module: small changes of it, each as new source."""
 
 import ast
-from collections import Counter
-from collections.abc import Iterator
+from collections import Counter, defaultdict
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
@@ -21,6 +21,7 @@ LOOKS = {
     "framealpha", "frameon", "gridspec_kw", "height_ratios", "labelsize", "linewidth", "markersize", "pad",
     "rotation", "shrink", "width_ratios", "xytext", "zorder",
 }  # fmt: skip
+MARKS = "mutants_marks"  # the module that marked sources call
 FUNCTIONS = {"min": "max", "max": "min", "any": "all", "all": "any"}
 
 
@@ -68,6 +69,22 @@ def mutants(file: Path) -> list[Mutant]:
             at = (node.lineno, statement[node])
             found.append(Mutant(file, place, number, kind, at, before, after, within))
     return found
+
+
+def marked(file: Path, lines: Mapping[int, int]) -> str:
+    """The source of a module that notes which of its statements it executes. lines: of each number to note
+    the first line of the statement. A statement outside of all functions is not marked.
+    """
+    tree = _parsed(file.read_text())
+    numbers: dict[int, list[ast.stmt]] = defaultdict(list)
+    for n, line in lines.items():
+        numbers[line] += ast.parse(f"__import__('{MARKS}').reached({n})").body
+    functions = (node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef))
+    for node in chain.from_iterable(map(ast.walk, functions)):
+        for name in ("body", "orelse", "finalbody"):
+            if isinstance(of := getattr(node, name, None), list):
+                setattr(node, name, [new for each in of for new in (*numbers.pop(each.lineno, ()), each)])
+    return ast.unparse(ast.fix_missing_locations(tree))
 
 
 def _parsed(text: str) -> ast.Module:

@@ -4,7 +4,7 @@ import ast
 import hashlib
 import subprocess
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from dataclasses import dataclass, replace
 from functools import cache
 from itertools import chain, zip_longest
@@ -24,8 +24,8 @@ EQUIVALENT = Path(__file__).with_name("equivalent.yaml")
 
 KERNELS, GLUE = "kernels", "glue"
 # How tests run: in plain Python, since to compile each mutant of a kernel would take all day; or compiled,
-# once for all, where no kernel changes; or compiled anew, if no plain test finds a mutant of a kernel.
-PLAIN, COMPILED, ANEW = "plain", "compiled", "anew"
+# once for all, where no kernel changes; or compiled again, if no plain test finds a mutant of a kernel.
+PLAIN, COMPILED, AGAIN = "plain", "compiled", "compiled again"
 FLIGHTS = ("diagnosis/test_short_flights.py", "relations/test_*.py", "reference/test_*.py")
 ANSWERS = TESTS / "cli" / "test_kept_answers.py"
 NOT_AT_NIGHT = "not nightly"
@@ -118,23 +118,27 @@ class Round:
         return replace(self, left_out=(*self.left_out, test))
 
 
-def rounds(file: Path, kind: str) -> list[Round]:
-    """The tests for a mutant of a module, the nearest first."""
-    near, every = nearest(file), _below(TESTS)
+def rounds(file: Path, kind: str, reached: Set[Path] = frozenset()) -> list[Round]:
+    """The tests for a mutant of a module, the nearest first. reached: the test files that execute glue."""
+    near = nearest(file)
     flights = {path for pattern in FLIGHTS for path in TESTS.glob(pattern)}
     if kind == KERNELS:
         wider = _below(TESTS / file.relative_to(CORE).parts[0])
-        found = [(PLAIN, wider & plain() - flights, BY_DAY), (ANEW, near - plain() | flights, BY_DAY)]
+        found = [(PLAIN, wider & plain() - flights, BY_DAY), (AGAIN, near - plain() | flights, BY_DAY)]
     else:
         found = [
-            (PLAIN, near & plain() - flights, BY_DAY),
-            (COMPILED, near - plain(), BY_DAY),
-            (COMPILED, {ANSWERS}, NOT_AT_NIGHT),
-            (COMPILED, near - plain() - {ANSWERS}, EACH_PUSH),
-            (COMPILED, every - near - plain() - {ANSWERS} | flights, BY_DAY),
+            (PLAIN, reached & plain(), BY_DAY),
+            (COMPILED, reached & near - plain(), BY_DAY),
+            (COMPILED, reached - near - plain(), BY_DAY),
+            (COMPILED, reached - plain(), EACH_PUSH),
         ]
     named = [(mode, tuple(sorted(map(str, files))), marks) for mode, files, marks in found]
     return [Round(mode, names, marks) for mode, names, marks in named if names]
+
+
+def every() -> set[Path]:
+    """All test files but those that use an installed wheel."""
+    return _below(TESTS)
 
 
 def nearest(file: Path) -> set[Path]:

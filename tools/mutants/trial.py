@@ -6,7 +6,7 @@ import signal
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Set
 from functools import cache
 from pathlib import Path
 
@@ -17,14 +17,14 @@ from tools.mutants.making import Mutant
 from tools.mutants.scope import COMPILED, CORE, KEPT, PLAIN, ROOT, SOURCES, Round, rounds
 
 TEST_S = 120.0  # of processor; a test that takes longer hangs
-ROUND_S = 3000.0  # by the clock: whoever takes longer waits for what never comes
+ROUND_S = 3000.0  # by the clock; what takes longer waits for what never comes
 
 SURVIVED, KILLED, HANGS = "LIVES", "killed", "hangs"
 
 
-def outcome(mutant: Mutant, kind: str) -> str:
+def outcome(mutant: Mutant, kind: str, reached: Set[Path]) -> str:
     """KILLED if a test fails with the mutant, and passes, alone, with the true module."""
-    for tests in rounds(mutant.file, kind):
+    for tests in rounds(mutant.file, kind, reached):
         ended = _outcome(mutant, tests)
         if ended != SURVIVED:
             return ended
@@ -61,14 +61,14 @@ def _run(tests: Round, file: Path, source: str, note: Path) -> str:
         status = pytest_quietly(["-x", *tests.asked], [_Note(note)])
         return 0 if status == pytest.ExitCode.NO_TESTS_COLLECTED else status
 
-    with _instead(file, source):
+    with in_place({file: source}):
         return in_a_child(tried)
 
 
 @contextlib.contextmanager
-def _instead(file: Path, source: str) -> Iterator[None]:
-    """Put a copy of the packages, links but for one file replaced, first on sys.path and PYTHONPATH: the
-    processes that tests start then import it as well."""
+def in_place(texts: Mapping[Path, str]) -> Iterator[Path]:
+    """Put a copy of the packages, links but for the files with another text, first on sys.path and on
+    PYTHONPATH: the processes that tests start then import it as well."""
     with tempfile.TemporaryDirectory() as folder:
         sources = Path(folder) / "src"
         sources.mkdir()
@@ -80,11 +80,12 @@ def _instead(file: Path, source: str) -> Iterator[None]:
                 place.symlink_to(true)  # what Python keeps of its modules as well: it is read alone
         for data in ("aircraft", "scenarios"):
             (Path(folder) / data).symlink_to(ROOT / data)
-        mutant = sources / file.relative_to(SOURCES)
-        mutant.unlink()
-        mutant.write_text(source)
+        for file, text in texts.items():
+            other = sources / file.relative_to(SOURCES)
+            other.unlink()
+            other.write_text(text)
         with _first(str(sources)):
-            yield
+            yield sources
 
 
 @contextlib.contextmanager

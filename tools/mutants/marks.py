@@ -1,0 +1,53 @@
+"""Which test files execute the statements that mutants change: one run of the tests, with marks."""
+
+import os
+import subprocess
+import sys
+import tempfile
+from collections import defaultdict
+from collections.abc import Sequence
+from pathlib import Path
+
+from tools.mutants.making import MARKS, Mutant, marked
+from tools.mutants.scope import ANSWERS, NOT_AT_NIGHT, ROOT, every, nearest, plain
+from tools.mutants.trial import in_place
+
+_TO = "BEAVER_FTC_MARKS"  # the file that marked statements write to
+# What they call. Each process notes each pair of a statement and a test file once.
+_CALLED = f"""
+import os
+_seen = set()
+def reached(n):
+    test = os.environ.get("PYTEST_CURRENT_TEST", "").partition("::")[0]
+    if test and (n, test) not in _seen:
+        _seen.add((n, test))
+        with open(os.environ["{_TO}"], "a") as file:
+            file.write(f"{{n}} {{test}}\\n")
+"""
+
+
+def reaching(mutants: Sequence[Mutant], jobs: int) -> list[set[Path]]:
+    """Of each mutant the test files that execute its statement. If none does, as with what runs when a module
+    is imported: those of its folder, and the answers of commands."""
+    lines: dict[Path, dict[int, int]] = defaultdict(dict)
+    for n, mutant in enumerate(mutants):
+        lines[mutant.file][n] = mutant.lines[1]
+    found: dict[int, set[Path]] = defaultdict(set)
+    with tempfile.TemporaryDirectory() as folder:
+        notes = Path(folder) / "notes"
+        notes.touch()
+        with in_place({file: marked(file, of) for file, of in lines.items()}) as sources:
+            (sources / f"{MARKS}.py").write_text(_CALLED)
+            _run(plain(), jobs, {"NUMBA_DISABLE_JIT": "1", _TO: str(notes)})
+            _run(every() - plain(), jobs, {_TO: str(notes)})
+        for note in notes.read_text().splitlines():
+            n, _, test = note.partition(" ")
+            found[int(n)].add(ROOT / test)
+    return [found[n] or nearest(mutant.file) | {ANSWERS} for n, mutant in enumerate(mutants)]
+
+
+def _run(files: set[Path] | frozenset[Path], jobs: int, variables: dict[str, str]) -> None:
+    """Run test files, whatever comes of it."""
+    spread = ("-q", "-n", str(jobs), "--dist", "loadfile", "-m", NOT_AT_NIGHT)
+    command = [sys.executable, "-m", "pytest", *spread, *sorted(map(str, files))]
+    subprocess.run(command, cwd=ROOT, env=os.environ | variables, capture_output=True, check=False)

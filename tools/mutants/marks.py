@@ -43,7 +43,7 @@ def reaching(mutants: Sequence[Mutant], jobs: int) -> list[set[Path]]:
         for note in notes.read_text().splitlines():
             n, _, test = note.partition(" ")
             found[int(n)].add(ROOT / test)
-    return [found[n] or nearest(mutant.file) | {ANSWERS} for n, mutant in enumerate(mutants)]
+    return [found[n] & every() or nearest(mutant.file) | {ANSWERS} for n, mutant in enumerate(mutants)]
 
 
 def _run(files: set[Path] | frozenset[Path], jobs: int, variables: dict[str, str]) -> None:

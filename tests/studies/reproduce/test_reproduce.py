@@ -20,6 +20,7 @@ from beaver_ftc.studies.reproduce.cases import (
     fly_case,
 )
 from beaver_ftc.studies.reproduce.claims import ABLATIONS, CLAIMS, MEASURED
+from beaver_ftc.studies.reproduce.judged import counted_apart
 from beaver_ftc.studies.reproduce.published_figures import FIGURES
 
 # What does not hold as flown, and what holds without its mechanism as well.
@@ -98,6 +99,13 @@ def test_the_four_verdicts(number, without, elsewhere, verdict):
     assert built.verdict(1.0, 3.0, [(2.0, np.nan)]) == claims.STRONGER
     assert built.verdict(1.0, 3.0, [(2.1, np.nan)]) == claims.BORNE_OUT
     assert not built.is_borne_out(2.0, np.nan)
+
+
+def test_what_is_true_by_construction_is_counted_apart():
+    row = {"reason": "", "construction": True}
+    counted = counted_apart([row | {"verdict": f"{word}borne out"} for word in ("", "not ", "not ")])
+    assert counted["construction"] == {"statements": 3, "hold": 1}
+    assert counted["testable"]["statements"] == 0
 
 
 def test_numbers_agree_with_the_log_itself():

@@ -108,14 +108,17 @@ NOTHING = (
     {"actuator": "elevator", "type": "loss_of_effectiveness", "magnitude": 1e-300},
     {"actuator": "rudder", "type": "bias", "bias_deg": 1e-300},
     {"type": "unanticipated", "Cm_alpha3": 1e-300},
+    {"sensor": "q", "type": "bias", "magnitude": 1e-300},
 )  # fmt: skip
 
 
+@pytest.mark.parametrize("before", [[], [loss(at_s=0.5)]], ids=len)
 @pytest.mark.parametrize("fault", NOTHING, ids=str)
-def test_a_fault_of_no_size_is_none(fault):
+def test_a_fault_of_no_size_is_none(fault, before):
     base = {"name": "x", "duration_s": 2.0, "reference": SINES}
-    healthy, broken = (bf.fly(base | {"faults": faults}).log for faults in ([], [fault | {"at_s": 1.0}]))
-    assert same_log(healthy, broken[healthy.columns])
+    faults = before, [*before, fault | {"at_s": 1.0}]
+    without, broken = (bf.fly(base | {"faults": each}).log for each in faults)
+    assert same_log(without, broken[without.columns])
 
 
 def test_faults_that_begin_together_may_stand_in_any_order():

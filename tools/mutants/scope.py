@@ -26,7 +26,7 @@ KERNELS, GLUE = "kernels", "glue"
 # How tests run: in plain Python, since to compile each mutant of a kernel would take all day; or compiled,
 # once for all, where no kernel changes; or compiled again, if no plain test finds a mutant of a kernel.
 PLAIN, COMPILED, AGAIN = "plain", "compiled", "compiled again"
-FLIGHTS = ("diagnosis/test_short_flights.py", "relations/test_*.py", "reference/test_*.py")
+FLIGHTS = ("loop/test_compiled_as_plain.py", "relations/test_*.py", "reference/test_*.py")
 ANSWERS = TESTS / "cli" / "test_kept_answers.py"
 NOT_AT_NIGHT = "not nightly"
 BY_DAY, EACH_PUSH = f"{NOT_AT_NIGHT} and not acceptance", f"{NOT_AT_NIGHT} and acceptance"

@@ -44,6 +44,13 @@ def test_an_error_within_the_declared_is_not(truth):
     assert warnings(f"{TOLD}{truth}\n") == ()
 
 
+@pytest.mark.parametrize(("dead_band_deg", "surfaces"), [(0.45, 0), (0.55, 4)])
+def test_a_dead_band_and_an_error_of_the_position_add_up(dead_band_deg, surfaces):
+    told = "fdi: {bounds: {actuators: {dead_band_deg: 0.3}, deflection_deg: 0.2}}"
+    truth = f"uncertainty: {{actuators: {{dead_band_deg: {dead_band_deg}}}}}"
+    assert len(warnings(f"{told}\n{truth}\n")) == surfaces
+
+
 SINUSOID = {"q": {"amplitude_rad_s2": 0.03, "frequency_rad_s": 20}}
 GUST = {"at_s": 1, "velocity_mps": [0, 0, 5]}
 

@@ -28,6 +28,10 @@ WRITERS = {
 }
 
 
+def test_of_rows_with_one_stamp_the_first_is_kept():
+    assert rows_with_increasing_time("x", np.array([0.0, 1.0, 1.0, 2.0]))[0].tolist() == [0, 1, 3]
+
+
 def test_a_jump_of_the_clock_costs_no_memory(tmp_path):
     """Every reader through both commands, in one process of 3 GB: the jump in the time base alone wants 4."""
     pytest.importorskip("pyulog"), pytest.importorskip("pymavlink")

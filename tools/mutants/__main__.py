@@ -62,7 +62,7 @@ def _trials(taken: list[tuple[str, Mutant]], jobs: int) -> Counter[tuple[str, st
     ends: Counter[tuple[str, str]] = Counter()
     kinds, mutants = zip(*taken, strict=True)
     glue = [mutant for kind, mutant in taken if kind == GLUE]
-    found = dict(zip(glue, reaching(glue, jobs), strict=True))
+    found = dict(zip(glue, reaching(glue, jobs) if glue else [], strict=True))
     reached = [found.get(mutant, set()) for mutant in mutants]
     with ProcessPoolExecutor(jobs, mp_context=get_context("fork")) as pool:
         done = pool.map(outcome, mutants, kinds, reached)

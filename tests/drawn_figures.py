@@ -26,10 +26,7 @@ def _panel(axes):
         "legend": _words(legend.texts) if legend else [],
         "texts": [[text.get_text(), *map(float, text.get_position())] for text in axes.texts],
         "curves": [[_look(line), *map(in_short, line.get_data())] for line in axes.lines],
-        "patches": [
-            in_short(patch.get_transform().transform_path(patch.get_path()).vertices)
-            for patch in axes.patches
-        ],
+        "patches": [in_short(_corners(patch)) for patch in axes.patches],
         "areas": [
             [in_short(path.vertices) for path in area.get_paths()] + [in_short(area.get_offsets())]
             for area in axes.collections
@@ -41,6 +38,7 @@ def _panel(axes):
 
 
 def _corners(patch):
+    """In the unit of the axes: where they lie on the page hangs on fonts."""
     return patch.get_patch_transform().transform_path(patch.get_path()).vertices
 
 

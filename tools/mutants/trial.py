@@ -38,10 +38,8 @@ def _outcome(mutant: Mutant, tests: Round) -> str:
         with tempfile.NamedTemporaryFile("r") as note:
             ended = _run(tests, mutant.file, mutant.source(), Path(note.name))
             failed = note.read().strip()
-        # None has failed if the mutant cannot be imported.
-        if ended != KILLED or _is_sound(
-            tests.mode, (failed,) if failed else ("--collect-only", *tests.tests)
-        ):
+        again = (failed,) if failed else ("--collect-only", *tests.tests)  # none: it cannot be imported
+        if ended != KILLED or _is_sound(tests.mode, again):
             return ended
         if not failed:
             raise RuntimeError(f"these tests cannot be collected: {' '.join(tests.tests)}")

@@ -26,7 +26,10 @@ def _panel(axes):
         "legend": _words(legend.texts) if legend else [],
         "texts": [[text.get_text(), *map(float, text.get_position())] for text in axes.texts],
         "curves": [[_look(line), *map(in_short, line.get_data())] for line in axes.lines],
-        "patches": [in_short(_corners(patch)) for patch in axes.patches],
+        # In the unit of the axes: where they lie on the page hangs on fonts.
+        "patches": [
+            in_short(of.get_patch_transform().transform_path(of.get_path()).vertices) for of in axes.patches
+        ],
         "areas": [
             [in_short(path.vertices) for path in area.get_paths()] + [in_short(area.get_offsets())]
             for area in axes.collections
@@ -35,11 +38,6 @@ def _panel(axes):
             [in_short(np.ma.filled(image.get_array(), np.nan)), *image.get_clim()] for image in axes.images
         ],
     }
-
-
-def _corners(patch):
-    """In the unit of the axes: where they lie on the page hangs on fonts."""
-    return patch.get_patch_transform().transform_path(patch.get_path()).vertices
 
 
 def _look(line):

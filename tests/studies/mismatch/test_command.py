@@ -7,6 +7,8 @@ import pytest
 
 import commands
 from beaver_ftc.results.log import StoredLog
+from beaver_ftc.studies.engine.study import run_into
+from beaver_ftc.studies.mismatch import over_envelope
 from beaver_ftc.studies.mismatch.sources import SOURCES
 from beaver_ftc.studies.mismatch.variants import VARIANTS, variant_of
 from flying import loss, scenario
@@ -107,3 +109,13 @@ def test_every_named_variant_is_a_valid_scenario_that_differs_in_its_design_mode
         exclude={"name", "design_model", "expect"}
     )
     assert (found.design_model == base.design_model) == (name == "declared")
+
+
+def test_what_the_slipstream_does_matters_more_at_low_speed(monkeypatch, tmp_path):
+    monkeypatch.setattr(over_envelope, "AIRSPEEDS_MPS", (40.0, 50.0))
+    monkeypatch.setattr(over_envelope, "ALTITUDES_M", (500.0,))
+    case = scenario(duration_s=2, design_model={"engine_terms": False})
+    found = run_into(over_envelope.map_study(case), tmp_path)["map"]
+    slow, fast = (entry for entry in found if entry["axis"] == "q")
+    assert slow["dominant"] == fast["dominant"] == "engine"
+    assert slow["worst_ratio"] > fast["worst_ratio"] > 1.0

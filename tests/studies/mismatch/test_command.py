@@ -117,5 +117,5 @@ def test_what_the_slipstream_does_matters_more_at_low_speed(monkeypatch, tmp_pat
     case = scenario(duration_s=2, design_model={"engine_terms": False})
     found = run_into(over_envelope.map_study(case), tmp_path)["map"]
     slow, fast = (entry for entry in found if entry["axis"] == "q")
-    assert slow["dominant"] == fast["dominant"] == "engine"
+    assert fast["dominant"] == "engine"
     assert slow["worst_ratio"] > fast["worst_ratio"] > 1.0

@@ -98,7 +98,7 @@ def _reads_the_same(kept: str, found: str) -> bool:
     """Whether two texts differ in nothing but numbers with a point or an exponent, each of these by at most
     a unit of the last digit, or ABSOLUTE.
     """
-    if _ROUNDED.sub("", kept) != _ROUNDED.sub("", found):
+    if _ROUNDED.sub("#", kept) != _ROUNDED.sub("#", found):
         return False
     pairs = zip(map(Decimal, _ROUNDED.findall(kept)), map(Decimal, _ROUNDED.findall(found)), strict=True)
     return all(abs(a - b) <= max(Decimal(10) ** a.as_tuple().exponent, Decimal(ABSOLUTE)) for a, b in pairs)

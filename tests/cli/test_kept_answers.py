@@ -13,12 +13,13 @@ from drawn_figures import shown
 from kept import page
 
 GIVEN = yaml.safe_load((Path(__file__).parents[1] / "data" / "answers.yaml").read_text())
-KEPT = (".html", ".json", ".md")
+KEPT = (".acmi", ".html", ".json", ".md", ".xml", ".yaml")
 # What hangs on the day, the machine and the code, and what pages have to look well.
 APART = re.compile(
     r'\d{4}-\d\d-\d\d \d\d:\d\d UTC|(?<=")[0-9a-f]{16,}(?=")|(beaver-ftc|jsbsim|numpy|numba|python) \d[.\d]+'
-    r"|<(style|script)\b.*?</\2>",
-    re.DOTALL,
+    r"|<(style|script)\b.*?</\2>"
+    r"|(?<=(?:eri|rit)(?:ved|ten) in )[\d.]+|(?<= time=\")[\d.]+|^[\w ]+: \d+%(, \d+ \w+ left)?$",
+    re.DOTALL | re.MULTILINE,
 )
 
 
@@ -33,7 +34,10 @@ def figures(monkeypatch):
 
     monkeypatch.setattr(Figure, "savefig", saved)
     monkeypatch.setattr("os.sched_getaffinity", lambda _: {0})
+    monkeypatch.setattr("secrets.randbits", lambda bits: 2**bits - 7)
     monkeypatch.setattr("beaver_ftc.studies.compare.trial.thread_time", lambda: 0.0)
+    for place, value in GIVEN["quick"].items():
+        monkeypatch.setattr(place, value)
     return found
 
 
@@ -45,7 +49,7 @@ def test_an_answer_says_and_shows_what_is_kept(name, figures, changed, tmp_path)
     written = sorted(file for file in tmp_path.rglob("*.*") if file.name not in GIVEN["files"])
     assert not changed(
         {
-            "said": [[one.returncode, *_read(one.stdout)] for one in said],
+            "said": [[one.returncode, *_read(one.stdout), *_read(one.stderr)] for one in said],
             "written": {file.name: _read(file.read_text()) for file in written if file.suffix in KEPT},
             "files": [file.name for file in written],
             "figures": figures,
@@ -61,4 +65,4 @@ def _read(text):
 
 
 def _unversioned(section):
-    return {key: value for key, value in section.items() if key != "versions"}
+    return {key: value for key, value in section.items() if key not in ("versions", "took_s")}

@@ -46,7 +46,8 @@ def test_it_raises_no_alarm_before_the_fault_and_one_soon_after(flown):
     assert all(detected[FAULT_FRAME + 20 :])
 
 
-def test_it_names_the_elevator_and_its_loss(flown):
+def test_it_names_the_elevator_and_its_loss(flown, changed):
+    assert not changed(flown.log[::50], relative=1e-3)
     assert flown.estimators.isolated == 1
     assert flown.estimators.theta[1, 1] == pytest.approx(-0.4, abs=0.02)
 

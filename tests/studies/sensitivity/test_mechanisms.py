@@ -199,12 +199,15 @@ def test_a_flight_that_failed_is_not_one_without_an_alarm(few_cells):
 
 
 @needs.service("proof")
-def test_a_document_and_its_files(tmp_path, monkeypatch, few_cells):
+def test_a_document_and_its_files(tmp_path, monkeypatch, few_cells, changed):
     monkeypatch.setattr(command, "margin_cells", lambda: [(DEFAULT, "high", "exact sensors")])
     line = ["mechanisms", "--draws", "1", "--workers", "1", "--out", str(tmp_path), "--format", "json"]
     done = CliRunner().invoke(app, line)
     assert done.exit_code == 0, done.output
     document = json.loads(done.stdout)
+    assert document.pop("versions")
+    assert document.pop("folder").startswith(str(tmp_path))
+    assert not changed(document, relative=1e-3)
     assert document["draws"] == 1
     assert [row["mechanism"] for row in document["mechanisms"]] == [each.name for each in MECHANISMS]
     assert document["margins"][0]["gain_margin_db"] > 6.0

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tools.autopilots import peers
+from tools.autopilots.reader import read
 from tools.autopilots.small import Small
 
 import beaver_ftc as bf
@@ -13,7 +14,8 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.plant.adapter import body_axes
 from beaver_ftc_links.sitl.ardupilot import Ardupilot
 from beaver_ftc_links.sitl.link import Link
-from beaver_ftc_links.sitl.px4 import quaternion
+from beaver_ftc_links.sitl.mavlink import Mavlink
+from beaver_ftc_links.sitl.px4 import Px4, quaternion
 from beaver_ftc_links.sitl.vehicle import Vehicle
 
 NO_PULSE = 0
@@ -49,17 +51,36 @@ def commands(pulses, trim_rad):
     return np.column_stack([aileron, elevator, rudder, np.full(len(pulses), trim_rad[3])])
 
 
+BROKEN = {
+    "faults": [
+        {"type": "loss_of_effectiveness", "actuator": "elevator", "magnitude": 0.4, "at_s": 0.5},
+        {"type": "bias", "sensor": "p", "magnitude": 2.0, "at_s": 0.8},
+    ]
+}
+
+
+def test_what_ardupilot_is_told_is_what_is_kept(changed):
+    end = Ardupilot(Vehicle(scenario(**BROKEN), pulses=True), Link())
+    told = [read(end.take(datagram, "it", 0.0)) for datagram in recorded(149, 100)[0]]
+    assert not changed(told[::20], relative=1e-3)
+
+
+def test_what_px4_is_told_is_what_is_kept(changed):
+    end = Px4(Vehicle(scenario(**BROKEN), pulses=False), Link(), Mavlink(), None)
+    autopilot = peers.Px4(Small().outputs, silent=0, armed_after=2)
+    answer, told = autopilot.hear(end.connect(0.0)), []
+    for k in range(300):
+        answer = autopilot.hear(end.take(answer, 0.004 * k))
+        told += [autopilot.state.to_dict(), autopilot.gps.to_dict()] if k % 50 == 49 else []
+    assert not changed(told, relative=1e-3)
+
+
 @pytest.mark.parametrize("noisy", [False, True])
 def test_recorded_packets_fly_what_the_same_commands_fly_in_process(noisy):
     """To the bit; with a fault of a surface and one of an instrument, turbulence, sensors and servos."""
-    keys = {
-        "faults": [
-            {"type": "loss_of_effectiveness", "actuator": "elevator", "magnitude": 0.4, "at_s": 0.5},
-            {"type": "bias", "sensor": "p", "magnitude": 2.0, "at_s": 0.8},
-        ]
-    }
+    keys = BROKEN
     if noisy:
-        keys |= {
+        keys = BROKEN | {
             "sensors": "tactical-grade", "actuators": "servo", "fdi.bounds.sensors": "tactical-grade",
             "environment": {"turbulence": "dryden", "severity": "light"},
         }  # fmt: skip

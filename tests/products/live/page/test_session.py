@@ -1,9 +1,11 @@
 """The flight behind the page: it breaks, is diagnosed, saved, and flies again to the bit."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 
 import beaver_ftc as bf
 from beaver_ftc.documents.errors import BadInput
@@ -11,6 +13,7 @@ from beaver_ftc_live.page import messages
 from beaver_ftc_live.page.messages import encode
 from beaver_ftc_live.page.session import Session, level_turn
 
+CONVERSATION = yaml.safe_load((Path(__file__).parents[3] / "data" / "conversation.yaml").read_text())
 LOSS = {"type": "loss_of_effectiveness", "actuator": "elevator", "magnitude": 0.4}
 
 
@@ -53,6 +56,15 @@ def test_a_loss_is_detected_named_and_told(session):
     flown(session, 2)
     assert session.frame()["effectiveness"] == [1.0] * 4
     assert session.state()["broken"] == []
+
+
+def test_what_a_page_hears_in_a_flight_is_what_is_kept(session, changed):
+    heard = [session.hello()]
+    for frames, request in CONVERSATION:
+        says = asked(session, **request)
+        flown(session, frames)
+        heard += [says, session.take_events(), session.frame(), session.state()]
+    assert not changed(heard, relative=1e-3)
 
 
 def test_what_is_saved_flies_again_to_the_bit(session, tmp_path):

@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 from beaver_ftc.cli.main import app
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs.detectors import detector_names
-from beaver_ftc_logs.recorded import comparison, other_days
+from beaver_ftc_logs.recorded import other_days
 from beaver_ftc_logs.recorded.benchmark import OUR_METHOD_TITLE, load_data_sets
 from products.logs import synthetic
 
@@ -28,18 +28,10 @@ def folder(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def compared(folder, tmp_path_factory):
-    """(what the command says, the folder it writes to)."""
-    out = tmp_path_factory.mktemp("compared")
-    arguments = ["compare", "--flights", str(folder), "--out", str(out), "--format", "json"]
-    done = CliRunner().invoke(app, arguments)
-    assert done.exit_code == 0, done.output
-    return json.loads(done.stdout), out / "recorded-flights"
-
-
-@pytest.fixture(scope="module")
-def document(compared):
-    return compared[0]
+def document(folder, tmp_path_factory):
+    """What the command says."""
+    arguments = ["compare", "--flights", str(folder), "--out", str(tmp_path_factory.mktemp("compared"))]
+    return json.loads(CliRunner().invoke(app, [*arguments, "--format", "json"]).stdout)
 
 
 def test_every_method_has_a_row_and_ours_is_right(document):
@@ -52,14 +44,7 @@ def test_every_method_has_a_row_and_ours_is_right(document):
     assert 0.5 < sliding["classes"] < rows[OUR_METHOD_TITLE]["classes"]
 
 
-def test_tables_have_a_line_a_method(document):
-    text, page = comparison.as_text(document), comparison.as_markdown(document)
-    for row in document["sets"][0]["rows"]:
-        assert row["method"] in text
-        assert f"| {row['method']} |" in page
-
-
-def test_other_days_have_a_row_each_and_a_worst(folder, monkeypatch, tmp_path):
+def test_other_days_have_a_row_each_and_a_worst(folder, monkeypatch, tmp_path, changed):
     days = other_days.random_days(2, range(2))
     monkeypatch.setattr(other_days, "one_change_days", lambda mixer, commands: days[:1])
     monkeypatch.setattr(other_days, "random_days", lambda surfaces, seeds: days[1:])
@@ -67,12 +52,10 @@ def test_other_days_have_a_row_each_and_a_worst(folder, monkeypatch, tmp_path):
     page.write_text("<!-- other days: begin -->\n<!-- other days: end -->\n")
     arguments = ["compare", "--flights", str(folder), "--other-days", "--format", "json"]
     done = CliRunner().invoke(app, [*arguments, "--leaderboard", str(page)])
-    (part,) = json.loads(done.stdout)["other_days"]["sets"]
-    assert [row["day"] for row in part["rows"]] == ["drawn 0", "drawn 1", "drawn 1"]
+    document = json.loads(done.stdout)["other_days"]
+    assert not changed(document, relative=1e-3)
+    (part,) = document["sets"]
     assert all(row["classes"] > 0.7 for row in part["rows"])
-    for one in part["summary"]:
-        assert one["worst"]["classes"] <= one["mean"]["classes"]
-        assert one["worst"]["mean_error"] >= one["mean"]["mean_error"]
     assert "| drawn, not looked at: worst |" in page.read_text()
 
 
@@ -103,9 +86,3 @@ def test_a_folder_without_flights_is_refused(tmp_path):
         load_data_sets(tmp_path)
     with pytest.raises(BadInput, match="no such folder"):
         load_data_sets(tmp_path / "none")
-
-
-def test_the_command_writes_both_files(compared):
-    document, out = compared
-    assert document["sets"][0]["set"] == "wing"
-    assert {path.name for path in out.iterdir()} == {"flights.json", "flights.md", "flights.png"}

@@ -9,16 +9,18 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from tools.mutants.making import MARKS, Mutant, marked
-from tools.mutants.scope import ANSWERS, NOT_AT_NIGHT, ROOT, every, nearest, plain
+from tools.mutants.scope import ANSWERS, NOT_AT_NIGHT, ROOT, every, is_answer, nearest, plain
 from tools.mutants.trial import in_place
 
 _TO = "BEAVER_FTC_MARKS"  # the file that marked statements write to
-# What they call. Each process notes each pair of a statement and a test file once.
+# What they call. Each process notes each pair of a statement and a test file, or an answer, once.
 _CALLED = f"""
 import os
 _seen = set()
 def reached(n):
-    test = os.environ.get("PYTEST_CURRENT_TEST", "").partition("::")[0]
+    test = os.environ.get("PYTEST_CURRENT_TEST", "").rpartition(" ")[0]
+    if not test.startswith("{ANSWERS.relative_to(ROOT)}"):
+        test = test.partition("::")[0]
     if test and (n, test) not in _seen:
         _seen.add((n, test))
         with open(os.environ["{_TO}"], "a") as file:
@@ -27,8 +29,9 @@ def reached(n):
 
 
 def reaching(mutants: Sequence[Mutant], jobs: int) -> list[set[Path]]:
-    """Of each mutant the test files that execute its statement. If none does, as with what runs when a module
-    is imported: those of its folder, and the answers of commands."""
+    """Of each mutant the test files that execute its statement, and of the answers of commands each single
+    test that does. If none does, as with what runs when a module is imported: the files of its folder, and
+    all answers."""
     lines: dict[Path, dict[int, int]] = defaultdict(dict)
     for n, mutant in enumerate(mutants):
         lines[mutant.file][n] = mutant.lines[1]
@@ -43,7 +46,11 @@ def reaching(mutants: Sequence[Mutant], jobs: int) -> list[set[Path]]:
         for note in notes.read_text().splitlines():
             n, _, test = note.partition(" ")
             found[int(n)].add(ROOT / test)
-    return [found[n] & every() or nearest(mutant.file) | {ANSWERS} for n, mutant in enumerate(mutants)]
+    known = every()
+    return [
+        {test for test in found[n] if test in known or is_answer(test)} or nearest(mutant.file) | {ANSWERS}
+        for n, mutant in enumerate(mutants)
+    ]
 
 
 def _run(files: set[Path] | frozenset[Path], jobs: int, variables: dict[str, str]) -> None:

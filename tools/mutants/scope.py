@@ -119,21 +119,30 @@ class Round:
 
 
 def rounds(file: Path, kind: str, reached: Set[Path] = frozenset()) -> list[Round]:
-    """The tests for a mutant of a module, the nearest first. reached: the test files that execute glue."""
+    """The tests for a mutant of a module, the nearest first. reached: the test files that execute glue, and
+    of the answers of commands single tests."""
     near = nearest(file)
     flights = {path for pattern in FLIGHTS for path in TESTS.glob(pattern)}
     if kind == KERNELS:
         wider = _below(TESTS / file.relative_to(CORE).parts[0])
         found = [(PLAIN, wider & plain() - flights, BY_DAY), (AGAIN, near - plain() | flights, BY_DAY)]
     else:
+        answers = {test for test in reached if is_answer(test)}
+        others = reached - answers - plain()
         found = [
             (PLAIN, reached & plain(), BY_DAY),
-            (COMPILED, reached & near - plain(), BY_DAY),
-            (COMPILED, reached - near - plain(), BY_DAY),
-            (COMPILED, reached - plain(), EACH_PUSH),
+            (COMPILED, answers, NOT_AT_NIGHT),
+            (COMPILED, others & near, BY_DAY),
+            (COMPILED, others - near, BY_DAY),
+            (COMPILED, others, EACH_PUSH),
         ]
     named = [(mode, tuple(sorted(map(str, files))), marks) for mode, files, marks in found]
     return [Round(mode, names, marks) for mode, names, marks in named if names]
+
+
+def is_answer(test: Path) -> bool:
+    """Whether it is the file of the answers, or a test in it."""
+    return test == ANSWERS or test.match(f"{ANSWERS}::*")
 
 
 def every() -> set[Path]:

@@ -129,7 +129,7 @@ def test_all_mistakes_at_once_in_the_order_of_the_file():
     lines = mistakes(
         "name: a b\n"
         "duration_s: 20\n"
-        "initial: {airspeed_mps: 5, altitude_ft: 3}\n"
+        "initial: {airspeed_mps: 5,\n altitude_ft: 3}\n"
         "faults:\n"
         "  - {type: bias, actuator: elevator, at_s: 25, end_s: 3}\n"
         "seed: 1\n"
@@ -139,11 +139,11 @@ def test_all_mistakes_at_once_in_the_order_of_the_file():
     assert [line.split(": ")[:2] for line in lines] == [
         ["s.yaml:1", "name"],
         ["s.yaml:3", "initial.airspeed_mps"],
-        ["s.yaml:3", "initial.altitude_ft"],
-        ["s.yaml:5", "faults[0].bias_deg"],
-        ["s.yaml:5", "faults[0].at_s"],
-        ["s.yaml:7", "seed"],
-        ["s.yaml:8", "expect.isolated_as"],
+        ["s.yaml:4", "initial.altitude_ft"],
+        ["s.yaml:6", "faults[0].bias_deg"],
+        ["s.yaml:6", "faults[0].at_s"],
+        ["s.yaml:8", "seed"],
+        ["s.yaml:9", "expect.isolated_as"],
     ]
 
 

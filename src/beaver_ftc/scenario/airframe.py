@@ -30,6 +30,7 @@ from beaver_ftc.documents.document import (
     deny,
     entry,
     number,
+    refuse_unknown,
 )
 from beaver_ftc.documents.errors import BeaverFtcError, suggestion
 from beaver_ftc.plugins import offered, required
@@ -225,7 +226,10 @@ def given_initial(given: Any) -> Any:
     """The flight condition given, as one of the aircraft in question."""
     if isinstance(given, Initial):
         given = given.model_dump(exclude_unset=True)
-    return initial_of(checked_aircraft()).model_validate(given)
+    model = initial_of(checked_aircraft())
+    if isinstance(given, dict):  # the JSON Schema has the keys of one aircraft alone
+        refuse_unknown((key for key in given if key not in model.model_fields), model.model_fields)
+    return model.model_validate(given)
 
 
 def default_initial() -> Initial:

@@ -156,7 +156,8 @@ def draw_comparison_figure(document: Document) -> Any:
         axis.tick_params(labelsize=8)
         axis.grid(color=GRID, linewidth=0.5)
         axis.set_axisbelow(True)
-        axis.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
+        if axis.lines:
+            axis.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
     return figure
 
 

@@ -1,5 +1,6 @@
 """Which test files execute the statements that mutants change: one run of the tests, with marks."""
 
+import contextlib
 import os
 import subprocess
 import sys
@@ -10,7 +11,7 @@ from pathlib import Path
 
 from tools.mutants.making import MARKS, Mutant, marked
 from tools.mutants.scope import ANSWERS, NOT_AT_NIGHT, ROOT, every, is_answer, nearest, plain
-from tools.mutants.trial import in_place
+from tools.mutants.trial import ROUND_S, in_place
 
 _TO = "BEAVER_FTC_MARKS"  # the file that marked statements write to
 # What they call. Each process notes each pair of a statement and a test file, or an answer, once.
@@ -54,7 +55,10 @@ def reaching(mutants: Sequence[Mutant], jobs: int) -> list[set[Path]]:
 
 
 def _run(files: set[Path] | frozenset[Path], jobs: int, variables: dict[str, str]) -> None:
-    """Run test files, whatever comes of it."""
+    """Run test files, whatever comes of it: a page that waits for its browser is not waited for."""
     spread = ("-q", "-n", str(jobs), "--dist", "loadfile", "-m", NOT_AT_NIGHT)
     command = [sys.executable, "-m", "pytest", *spread, *sorted(map(str, files))]
-    subprocess.run(command, cwd=ROOT, env=os.environ | variables, capture_output=True, check=False)
+    with contextlib.suppress(subprocess.TimeoutExpired):
+        subprocess.run(
+            command, cwd=ROOT, env=os.environ | variables, capture_output=True, check=False, timeout=ROUND_S
+        )

@@ -17,7 +17,7 @@ from tools.mutants.making import Mutant
 from tools.mutants.scope import COMPILED, CORE, KEPT, PLAIN, ROOT, SOURCES, Round, rounds
 
 TEST_S = 120.0  # of processor; a test that takes longer hangs
-ROUND_S = 3000.0  # by the clock; what takes longer waits for what never comes
+ROUND_S = 1500.0  # by the clock; what takes longer waits for what never comes
 
 SURVIVED, KILLED, HANGS = "LIVES", "killed", "hangs"
 

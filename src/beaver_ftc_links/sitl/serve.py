@@ -211,7 +211,7 @@ def serve(scenario: Scenario, options: Options, say: Say) -> Flight:
             endpoint.show(besides.enter_context(beside(options.page)))
         if kind == socket.SOCK_STREAM:
             listener.listen()
-        host, port = listener.getsockname()[:2]
+        host, port = listener.getsockname()
         say(f"{NAMES[options.protocol]}: {'UDP' if kind == socket.SOCK_DGRAM else 'TCP'} {host}:{port}")
         try:
             with _ended_by_signal(endpoint):

@@ -115,7 +115,8 @@ def _flow_rates(state: np.ndarray, coef: Mapping, betadot_ratio: float) -> np.nd
     return np.array([Vdot, alphadot, betadot / (1.0 - side)])
 
 
-_INERTIA_KG_M2 = np.array(
+LENGTHS_M = np.array([GEOMETRY.span_m, GEOMETRY.chord_m, GEOMETRY.span_m])
+INERTIA_KG_M2 = np.array(
     [[MASS.Ix_kg_m2, 0.0, -MASS.Jxz_kg_m2], [0.0, MASS.Iy_kg_m2, 0.0], [-MASS.Jxz_kg_m2, 0.0, MASS.Iz_kg_m2]]
 )
 
@@ -123,10 +124,9 @@ _INERTIA_KG_M2 = np.array(
 def _body_accelerations(state: np.ndarray, coef: Mapping) -> np.ndarray:
     """pdot, qdot, rdot, rad/s2: I x' = M - cross(x, I x), with x = (p, q, r), M (3,) N m."""
     x = state[3:6]
-    lengths = np.array([GEOMETRY.span_m, GEOMETRY.chord_m, GEOMETRY.span_m])
-    arms = coef["qdyn"] * GEOMETRY.wing_area_m2 * lengths
+    arms = coef["qdyn"] * GEOMETRY.wing_area_m2 * LENGTHS_M
     M = arms * np.array([coef[name] for name in MOMENTS])
-    return np.linalg.solve(_INERTIA_KG_M2, M - np.cross(x, _INERTIA_KG_M2 @ x))
+    return np.linalg.solve(INERTIA_KG_M2, M - np.cross(x, INERTIA_KG_M2 @ x))
 
 
 def _flow(alpha: complex, beta: complex) -> np.ndarray:

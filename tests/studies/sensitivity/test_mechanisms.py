@@ -27,6 +27,7 @@ from beaver_ftc.studies.sensitivity.mechanisms import (
 from beaver_ftc.studies.sensitivity.systems import DEFAULT, LAW, MECHANISMS, PAPER
 
 ELEVATOR = Flight("loss 80 %", "high", 0.0, "exact sensors", 1)
+HARD = Flight("unanticipated", "low", 0.05, "real sensors, light turbulence", 0)
 EVERY = pytest.mark.parametrize("mechanism", MECHANISMS, ids=lambda each: each.key)
 BY_KEY = {each.key: each for each in MECHANISMS}
 
@@ -43,16 +44,17 @@ def flat(value, path=""):
 
 
 @EVERY
-def test_only_the_keys_of_a_mechanism_differ(mechanism):
-    whole = scenario_of(ELEVATOR, 7, mechanism.system)
+def test_only_the_keys_of_a_mechanism_differ(mechanism, changed):
+    whole = scenario_of(HARD, 7, mechanism.system)
     there, gone = (
-        flat(changed.model_dump(mode="json"))
-        for changed in (whole.with_(mechanism.present), without_mechanism(whole, mechanism))
+        flat(scenario.model_dump(mode="json"))
+        for scenario in (whole.with_(mechanism.present), without_mechanism(whole, mechanism))
     )
     differ = {key for key in {*there, *gone} if there.get(key) != gone.get(key)}
     own = {*mechanism.without, *mechanism.present} | ({CONSTANT} if "thresholds" in mechanism.name else set())
     assert bool(differ) != bool(mechanism.withheld)
     assert all(key.startswith(tuple(own)) for key in differ), differ
+    assert not changed({key: gone.get(key) for key in differ})
 
 
 @EVERY
@@ -94,8 +96,11 @@ def test_draws_are_within_the_declaration_but_for_the_undeclared_error():
             assert {fact.key.rpartition(".")[0] for fact in undeclared(wrong)} == {"uncertainty.coefficients"}
 
 
-def test_systems_fly_the_same_draw_and_cells_have_draws_of_their_own():
+def test_systems_fly_the_same_draw_and_cells_have_draws_of_their_own(changed):
     paper, default = (scenario_of(ELEVATOR, 7, system) for system in (PAPER, DEFAULT))
+    assert not changed(
+        [flat(each.model_dump(mode="json")) for each in (paper, scenario_of(HARD, 7, DEFAULT))]
+    )
     for of in (
         "seed",
         "initial",

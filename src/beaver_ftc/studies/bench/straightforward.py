@@ -10,7 +10,7 @@ import numpy as np
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.aircraft.aircraft import EARTH_RATE_RAD_S
 from beaver_ftc.control.laws.reference import discretise
-from beaver_ftc.design.fdc import GEOMETRY, MASS, MOMENTS, SURFACES, TERMS
+from beaver_ftc.design.fdc import GEOMETRY, INERTIA_KG_M2, LENGTHS_M, MASS, MOMENTS, SURFACES, TERMS
 from beaver_ftc.design.model import inertia_coefficients
 from beaver_ftc.diagnosis.detection.fdae import (
     ALPHA_CENTRES_RAD,
@@ -34,12 +34,8 @@ Signals = dict[str, float]  # true signals by their name in the log
 # xdot = I^-1 (M - x cross I x), x (3,) rad/s. The moments M (3,), N m, are q S L C: dynamic pressure, wing
 # area, LENGTHS_M, coefficients Cl, Cm, Cn. A coefficient is a sum of terms; each term is a value times powers
 # of SIGNALS, and for a term of a surface times its deflection.
-INERTIA = np.array(
-    [[MASS.Ix_kg_m2, 0, -MASS.Jxz_kg_m2], [0, MASS.Iy_kg_m2, 0], [-MASS.Jxz_kg_m2, 0, MASS.Iz_kg_m2]]
-)
-INVERSE = np.linalg.inv(INERTIA)
+INVERSE = np.linalg.inv(INERTIA_KG_M2)
 COUPLING = np.array([getattr(inertia_coefficients(MASS), name) for name in ("Pqr", "Qpr", "Rpq")])
-LENGTHS_M = np.array([GEOMETRY.span_m, GEOMETRY.chord_m, GEOMETRY.span_m])
 OF_MOMENTS = [term for term in TERMS.values() if term.coefficient in MOMENTS]
 VALUES = np.array([term.value for term in OF_MOMENTS])
 POWERS = np.array([[dict(term.of).get(signal, 0) for signal in SIGNALS] for term in OF_MOMENTS])
@@ -58,7 +54,7 @@ def f_and_G(x: np.ndarray, truth: Signals) -> tuple[np.ndarray, np.ndarray]:
     scale = truth["qdyn_pa"] * GEOMETRY.wing_area_m2 * LENGTHS_M
     moments = scale * coefficients[:, 0]
     slopes = scale[:, None] * coefficients[:, 1:]
-    return INVERSE @ (moments - np.cross(x, INERTIA @ x)), INVERSE @ slopes
+    return INVERSE @ (moments - np.cross(x, INERTIA_KG_M2 @ x)), INVERSE @ slopes
 
 
 class Estimators:

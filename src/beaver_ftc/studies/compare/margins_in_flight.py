@@ -17,7 +17,8 @@ import numpy as np
 
 from beaver_ftc.control import flown_by
 from beaver_ftc.control.laws.loop_design import margins
-from beaver_ftc.loop.loop import Loop
+from beaver_ftc.loop.loop import fly
+from beaver_ftc.results.log import Columns
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies import margins as closed_form
 from beaver_ftc.studies.margins import Margin
@@ -47,12 +48,14 @@ def margins_of(scenario: Scenario) -> list[Margin]:
 
 def _measured(scenario: Scenario) -> Iterator[Margin]:
     """The margins at one flight condition, from a flight without a pulse and one for each surface."""
+    dt = 1.0 / scenario.rate_hz
     trimmed = in_trim(scenario)
     still = _positions(trimmed)
-    omega = frequencies(1.0 / scenario.rate_hz)
+    pulse = {"type": "bias", "bias_deg": PULSE_DEG, "at_s": PULSE_AT_S, "end_s": PULSE_AT_S + dt}
     for surface in scenario.airframe.primary:
-        moved = _positions(_pulsed(trimmed, surface))
-        numbers = _margins(still[surface], moved[surface], omega, 1.0 / scenario.rate_hz)
+        moved = _positions(trimmed.with_({"faults": [{"actuator": surface, **pulse}]}))
+        column = f"{surface}_pos_rad"
+        numbers = _margins(still[column], moved[column], frequencies(dt), dt)
         yield Margin(scenario.initial.airspeed_mps, "none", surface, *numbers)
 
 
@@ -71,20 +74,11 @@ def in_trim(scenario: Scenario) -> Scenario:
     })  # fmt: skip
 
 
-def _pulsed(scenario: Scenario, surface: str) -> Scenario:
-    """The scenario with the pulse, a bias fault that lasts one frame."""
-    end_s = PULSE_AT_S + 1.0 / scenario.rate_hz
-    pulse = {"actuator": surface, "type": "bias", "bias_deg": PULSE_DEG, "at_s": PULSE_AT_S, "end_s": end_s}
-    return scenario.with_({"faults": [pulse]})
-
-
-def _positions(scenario: Scenario) -> dict[str, np.ndarray]:
+def _positions(scenario: Scenario) -> Columns:
     """The position of each primary surface in a flight, (frames,) rad."""
-    loop = Loop(scenario)
-    rows = np.concatenate([chunk.copy() for chunk in loop.chunks()])
-    places = {name: loop.columns.index(f"{name}_pos_rad") for name in scenario.airframe.primary}
-    loop.release()
-    return {name: rows[:, place] for name, place in places.items()}
+    log = Columns(*(f"{name}_pos_rad" for name in scenario.airframe.primary))
+    fly(scenario, log)
+    return log
 
 
 def _margins(still: np.ndarray, moved: np.ndarray, omega: np.ndarray, dt: float) -> tuple[float, ...]:

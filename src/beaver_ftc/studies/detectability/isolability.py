@@ -7,7 +7,6 @@ half of them. The map also has the doublet that is certain to distinguish losses
 straight flight, as `separate` finds it.
 """
 
-from collections.abc import Sequence
 from itertools import permutations
 from math import inf
 
@@ -21,9 +20,7 @@ from beaver_ftc.studies.present.tables import finite
 
 LOSS_COLUMNS = ("magnitude", "magnitude_median", "longest_s", "median_s")
 DOUBLET_COLUMNS = ("doublet_deg", "doublet_s", "why")
-WITHOUT_DOUBLETS = dict(
-    zip(DOUBLET_COLUMNS, (None, None, "no installed package offers 'doublets'"), strict=True)
-)
+NO_DOUBLETS = {"why": "no installed package offers 'doublets'"}
 DISTINGUISHED_LOSS = 0.5  # share of effectiveness lost: of both losses that a doublet distinguishes
 
 
@@ -62,10 +59,4 @@ def smallest_doublets(scenario: Scenario, after_s: float) -> dict[tuple[str, str
     losses of DISTINGUISHED_LOSS of the two; or why there is none."""
     find = offered("doublets")
     pairs = permutations(scenario.airframe.class_of_losses, 2)
-    return find(scenario, after_s, DISTINGUISHED_LOSS) if find else dict.fromkeys(pairs, WITHOUT_DOUBLETS)
-
-
-def rows_without_result(faults: Sequence[str], why: str) -> list[Document]:
-    """The rows, one a pair of surfaces, of a place that has no result, with the reason `why`."""
-    empty = dict.fromkeys((*LOSS_COLUMNS, *DOUBLET_COLUMNS)) | {"why": why}
-    return [{"fault": fault, "other": other, **empty} for fault, other in permutations(faults, 2)]
+    return find(scenario, after_s, DISTINGUISHED_LOSS) if find else dict.fromkeys(pairs, NO_DOUBLETS)

@@ -3,7 +3,7 @@ excitations."""
 
 from collections.abc import Collection, Mapping, Sequence
 from functools import partial
-from itertools import product
+from itertools import permutations, product
 from pathlib import Path
 
 import numpy as np
@@ -103,13 +103,16 @@ def rows_at_place(scenario: Scenario, point: tuple[float, float, float]) -> dict
             raise SimulationFailed(TOO_SHORT)
         doublets = isolability.smallest_doublets(at(flown, *point[:2], 0.0), SETTLED_S)
     except BeaverFtcError as error:
-        no_result = dict.fromkeys((*MAGNITUDES, "confused_with")) | {"why": str(error)}
-        points = [{"fault": fault, **no_result} for fault in faults]
-        pairs = isolability.rows_without_result(faults, str(error))
+        why = {"why": str(error)}
+        points = [{"fault": fault, **why} for fault in faults]
+        pairs = [{"fault": fault, "other": other, **why} for fault, other in permutations(faults, 2)]
     else:
         points = [{"fault": fault, **judge(flight, fault)} for fault in flight.moment]
         pairs = [row | doublets[row["fault"], row["other"]] for row in pairs_of(flight)]
-    return {"points": [place | row for row in points], "pairs": [place | row for row in pairs]}
+    return {
+        "points": [dict.fromkeys(POINT_COLUMNS) | place | row for row in points],
+        "pairs": [dict.fromkeys(PAIR_COLUMNS) | place | row for row in pairs],
+    }
 
 
 def at(scenario: Scenario, speed_mps: float, altitude_m: float, excitation: float) -> Scenario:

@@ -122,7 +122,7 @@ def document_of(rows: Sequence[Document]) -> Summary:
         "beside": beside.document_of(
             beside.fly_both(), [row[FALSE_ALARM] for row in rows if FALSE_ALARM in row]
         ),
-        "truth_and_design": truth_and_design.document_of(truth_and_design.fly_designs()),
+        "truth_and_design": truth_and_design.document_of(),
         "choices": [asdict(choice) for choice in (*CHOICES, *OPTIONS)],
         "gains": rows_of_gains(pairs_of),
         "sensitivity": sensitivity_rows(pairs_of),

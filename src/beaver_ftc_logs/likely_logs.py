@@ -83,7 +83,8 @@ def _find_time(path: Path) -> TimeSource | None:
     phrases: list[str] = []
     for name in sorted(time_names, key=lambda name: name != TIME_COLUMN):
         cells = first_cells_of_column(path, name)
-        stamps = cells.numbers[name][np.isfinite(cells.numbers[name])]
+        stamps = cells.numbers.get(name, np.empty(0))  # none in a table whose times are dates
+        stamps = stamps[np.isfinite(stamps)]
         if phrase := text_of_column_phrase(cells, name):
             phrases.append(f"{name} holds {phrase.removeprefix(', but ')}")
         step = median_step_s(stamps)

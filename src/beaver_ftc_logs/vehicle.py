@@ -12,6 +12,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
+from beaver_ftc.aircraft import AXES
 from beaver_ftc.documents import (
     BadInput,
     Conflict,
@@ -138,15 +139,23 @@ class Vehicle(Section):
 
     @model_validator(mode="after")
     def _check_names(self) -> "Vehicle":
-        """Refuse names of surfaces that no column may have, repeated commands, surfaces that no command
-        moves, names that the file does not define, and wrong units."""
+        """Refuse names of surfaces that no column may have, repeated commands and rates, surfaces that no
+        command moves, names that the file does not define, and wrong units."""
         # The name of a surface becomes a part of names of columns in diagnosis.parquet.
         reason = "a surface's name has letters, digits, - and _ only, allowed: one"
         bad = [name for name in self.surfaces if not _SURFACE_NAME_PATTERN.fullmatch(name)]
         mistakes: list[Conflict] = [(("surfaces", name), f"{name!r}: {reason}") for name in bad]
         commands = self.command_columns
-        repeated = [i for i, column in enumerate(commands) if column in commands[:i]]
-        mistakes += [(("commands", i), f"{commands[i]!r} stands twice, allowed: each once") for i in repeated]
+        of_key: list[tuple[str, Iterable[int | str], list[str]]] = [
+            ("commands", range(len(commands)), commands),
+            ("rates", AXES, self.rate_columns),
+        ]
+        for key, places, columns in of_key:
+            mistakes += [
+                ((key, place), f"{column!r} stands twice, allowed: each once")
+                for i, (place, column) in enumerate(zip(places, columns, strict=True))
+                if column in columns[:i]
+            ]
         for surface, weights in self.surfaces.items():
             at = ("surfaces", surface)
             mistakes += _unknown_name_conflicts(at, weights, "command", commands)

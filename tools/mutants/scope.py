@@ -146,7 +146,7 @@ def is_answer(test: Path) -> bool:
 
 
 def every() -> set[Path]:
-    """All test files but those that use an installed wheel."""
+    """All test files but those that use an installed wheel, or a browser, which takes minutes."""
     return _below(TESTS)
 
 
@@ -161,7 +161,8 @@ def nearest(file: Path) -> set[Path]:
 
 
 def _below(folder: Path) -> set[Path]:
-    return set(folder.rglob("test_*.py")) - set((TESTS / "acceptance").glob("*.py"))
+    found = set(folder.rglob("test_*.py")) - set((TESTS / "acceptance").glob("*.py"))
+    return {file for file in found if "live_browser" not in file.read_text()}
 
 
 @cache

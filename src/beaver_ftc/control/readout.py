@@ -5,6 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from beaver_ftc.diagnosis.readout import Readout, value
+
 
 class DefaultLaw(NamedTuple):
     """The default law's gains, over dynamic pressure, and what it assumes of actuators and frames.
@@ -23,30 +25,21 @@ class DefaultLaw(NamedTuple):
     share: float
 
 
-class ControlReadout:
-    """Each part of the control stage, as it is in the frame in which this part is read first."""
+class ControlReadout(Readout):
+    """Each part of the control stage, as it is in the frame in which this part is read first.
 
-    def __init__(self, control: np.void) -> None:
-        self._control = control
+    main        number of the surface that leads roll, pitch and yaw, (3,)
+    stand_in    number of the surface that stands in for the one that leads pitch, -1 for none
+    trim_rad    the surfaces in trim, (surfaces,) rad
+    """
 
-    @cached_property
-    def main(self) -> np.ndarray:
-        """Number of the surface that leads roll, pitch and yaw, (3,)."""
-        return np.array(self._control["layout"]["main"])
-
-    @cached_property
-    def stand_in(self) -> int:
-        """Number of the surface that stands in for the one that leads pitch, -1 for none."""
-        return int(self._control["layout"]["stand_in"])
-
-    @cached_property
-    def trim_rad(self) -> np.ndarray:
-        """The surfaces in trim, (surfaces,) rad."""
-        return np.array(self._control["layout"]["trim"])
+    main = value(np.array, "layout", "main")
+    stand_in = value(int, "layout", "stand_in")
+    trim_rad = value(np.array, "layout", "trim")
 
     @cached_property
     def default_law(self) -> DefaultLaw:
         """Gains of the default law, and what it assumes."""
-        law = self._control["rejecting"]["config"]
+        law = self._record["rejecting"]["config"]
         names = "qdyn", "Kp_at", "L_rate_at", "L_disturbance_at", "lead"
         return DefaultLaw._make((*(law[name].copy() for name in names), float(law["share"])))

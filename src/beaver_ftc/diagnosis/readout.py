@@ -189,36 +189,42 @@ class SensorMonitor(NamedTuple):
 
     enabled, has_raised_alarm      whether it runs; whether its own alarm stands
     worst_test_index, top_ratio    test with the largest ratio of residual to bound, and that ratio
-    worst_test                     residual and bounds of that test
     isolated_sensor_index          the isolated sensor, or -1
-    is_reading_unused              (sensors,): whether the reading is no longer used
     sample_time_s                  time between two samples
     gust_change_mps                (poles,): bound on the changes of a gust through the filters
     predicted_reading,
     reading_bound                  (sensors,), SI: prediction, of the engine its commands; bound on the error
+    worst_test                     residual and bounds of the test with the largest ratio
+    is_reading_unused              (sensors,): whether the reading is no longer used
     """
 
     enabled: bool
     has_raised_alarm: bool
     worst_test_index: int
     top_ratio: float
-    worst_test: SensorTest
     isolated_sensor_index: int
-    is_reading_unused: np.ndarray
     sample_time_s: float
     gust_change_mps: np.ndarray
     predicted_reading: np.ndarray
     reading_bound: np.ndarray
+    worst_test: SensorTest
+    is_reading_unused: np.ndarray
 
 
-def _value(kind: Callable[[Any], Read], *path: str) -> cached_property[Read]:
-    """A property of a readout: one value of a kind, at a path of names in the record of the diagnosis."""
-    return cached_property(lambda readout: kind(reduce(getitem, path, readout._fdi)))
+def value(kind: Callable[[Any], Read], *path: str | int) -> cached_property[Read]:
+    """A property of a readout: one value of a kind, at a path of names and numbers in its record."""
+    return cached_property(lambda readout: kind(reduce(getitem, path, readout._record)))
 
 
-class DiagnosisReadout:
-    """The diagnosis at one frame. Each value is copied when it is read first, so a readout is for one frame;
-    the classes above document the values.
+class Readout:
+    """Values of a record, each copied when it is read first, so a readout is for one frame."""
+
+    def __init__(self, record: np.void) -> None:
+        self._record = record
+
+
+class DiagnosisReadout(Readout):
+    """The diagnosis at one frame; the classes above document the values.
 
     enabled, scheme_number       whether the diagnosis runs; number of its scheme (`state.scheme_number`)
     diagnoses_all_types          whether it examines faults of every type
@@ -233,68 +239,65 @@ class DiagnosisReadout:
                                  (3,) (rad/s2)^2
     """
 
-    enabled = _value(bool, "config", "enabled")
-    scheme_number = _value(int, "config", "scheme_number")
-    diagnoses_all_types = _value(bool, "config", "diagnoses_all_types")
-    detected = _value(bool, "verdict", "detected")
-    detected_at_s = _value(float, "verdict", "detected_at_s")
-    isolated_estimator = _value(int, "verdict", "isolated_estimator")
-    n_frames_in_block_so_far = _value(int, "types", "block", "n_so_far")
-    statistical_alarm_level = _value(float, "statistical", "test", "alarm_level")
-    acceleration_variance_from_input_noise = _value(np.array, "statistical", "noise", "Q")
-
-    def __init__(self, fdi: np.void) -> None:
-        self._fdi = fdi
+    enabled = value(bool, "config", "enabled")
+    scheme_number = value(int, "config", "scheme_number")
+    diagnoses_all_types = value(bool, "config", "diagnoses_all_types")
+    detected = value(bool, "verdict", "detected")
+    detected_at_s = value(float, "verdict", "detected_at_s")
+    isolated_estimator = value(int, "verdict", "isolated_estimator")
+    n_frames_in_block_so_far = value(int, "types", "block", "n_so_far")
+    statistical_alarm_level = value(float, "statistical", "test", "alarm_level")
+    acceleration_variance_from_input_noise = value(np.array, "statistical", "noise", "Q")
 
     @cached_property
     def layout(self) -> LayoutOfAllSurfaces:
         """Axes and estimators of the surfaces."""
         names = ("dominant_axis", "loss", "position")
-        return LayoutOfAllSurfaces(*(tuple(self._fdi["layout"][name].tolist()) for name in names))
+        return LayoutOfAllSurfaces(*(tuple(self._record["layout"][name].tolist()) for name in names))
 
     @cached_property
     def is_estimator_excluded(self) -> np.ndarray:
         """(estimators,): whether each is excluded."""
-        return estimator_records(self._fdi)["excluded"].astype(bool)
+        return estimator_records(self._record)["excluded"].astype(bool)
 
     @cached_property
     def estimators(self) -> tuple[IsolationEstimator, ...]:
         """The isolation estimators, in the bank's order; none where another scheme isolates."""
-        return tuple(map(_read_estimator, estimator_records(self._fdi)))
+        return tuple(map(_read_estimator, estimator_records(self._record)))
 
     @cached_property
     def types_config(self) -> FaultTypesConfig:
         """How fault types are examined."""
         names = "single_instant n_substeps returns_lagged frames_per_block block_duration_s"
-        return _read(FaultTypesConfig, self._fdi["types"]["config"], names)
+        return _read(FaultTypesConfig, self._record["types"]["config"], names)
 
     @cached_property
     def surface_fault_types(self) -> tuple[SurfaceFaultTypes, ...]:
         """Return for each surface its actuator and the types excluded on it."""
-        return tuple(map(_read_surface, self._fdi["types"]["surface"]))
+        return tuple(map(_read_surface, self._record["types"]["surface"]))
 
     @cached_property
     def declared_bounds(self) -> DeclaredBounds:
         """The declared uncertainty."""
-        errors = self._fdi["bound"]["declared_errors"]
+        errors = self._record["bound"]["declared_errors"]
         gyro_errors = (errors[name][:3] * bool(errors["given"]) for name in ("e0", "steady", "e1"))
         names = "eta_bar n_gyro inertia_coupling_error_share const earth_rate_rad_s"
-        return _read(DeclaredBounds, self._fdi["bound"], names, *gyro_errors)
+        return _read(DeclaredBounds, self._record["bound"], names, *gyro_errors)
 
     @cached_property
     def gust(self) -> GustReadout:
         """Gusts as the vanes see them."""
-        return _read(GustReadout, self._fdi["statistical"]["gust"]["output"], "gusty measured")
+        return _read(GustReadout, self._record["statistical"]["gust"]["output"], "gusty measured")
 
     @cached_property
     def statistical_filters(self) -> tuple[StatisticalBlock, ...]:
         """The filters of the statistical detector."""
-        return tuple(map(_read_block, self._fdi["statistical"]["block"]))
+        return tuple(map(_read_block, self._record["statistical"]["block"]))
 
     @cached_property
     def sensor_monitor(self) -> SensorMonitor:
         """The sensor monitor."""
-        return _read_sensor_monitor(self._fdi["sensor_monitor"])
+        return _read_sensor_monitor(self._record["sensor_monitor"])
 
 
 def estimator_records(fdi: np.void) -> np.ndarray:
@@ -375,13 +378,12 @@ def alarm_flags(fdi: np.void) -> tuple[np.int64, np.int64]:
 
 def _read(kind: type[Read], record: np.void, names: str, *others: Any) -> Read:
     """An object of a class, its first fields copied from the fields of a record that `names` lists in this
-    order, each turned into the type of the field; others: the values of the further fields."""
+    order, each turned into the type of the field (`a.b`: field b of field a); others: the values of the
+    further fields."""
     hints = get_type_hints(kind).values()
     copies = {np.ndarray: np.array}
-    return kind(
-        *(copies.get(hint, hint)(record[name]) for hint, name in zip(hints, names.split(), strict=False)),
-        *others,
-    )
+    found = (reduce(getitem, name.split("."), record) for name in names.split())
+    return kind(*(copies.get(hint, hint)(one) for hint, one in zip(hints, found, strict=False)), *others)
 
 
 def _read_estimator(fie: np.void) -> IsolationEstimator:
@@ -411,12 +413,11 @@ def _read_block(blk: np.void) -> StatisticalBlock:
 
 
 def _read_sensor_monitor(mon: np.void) -> SensorMonitor:
-    o = mon["output"]
-    j = int(o["worst_test_index"])
-    worst = (mon[name][j].copy() for name in ("residual", "per_s", "per_sample", "gust", "r", "B"))
-    return SensorMonitor(
-        bool(mon["config"]["enabled"]), bool(o["alarmed"]), j,
-        float(o["top_ratio"]), SensorTest(*worst), int(o["isolated_sensor"]),
-        o["is_reading_unused"].astype(bool), float(mon["h"]),
-        *(mon[name].copy() for name in ("gust_change", "y_pred", "e")),
-    )  # fmt: skip
+    output = mon["output"]
+    names = ("residual", "per_s", "per_sample", "gust", "r", "B")
+    worst = SensorTest(*(mon[name][output["worst_test_index"]].copy() for name in names))
+    fields = (
+        "config.enabled output.alarmed output.worst_test_index output.top_ratio output.isolated_sensor "
+        "h gust_change y_pred e"
+    )
+    return _read(SensorMonitor, mon, fields, worst, output["is_reading_unused"].astype(bool))

@@ -10,9 +10,9 @@ from typing import NamedTuple
 import numpy as np
 
 from beaver_ftc.control.readout import ControlReadout
-from beaver_ftc.design.model import InertiaCoefficients, inertia_of
+from beaver_ftc.design.model import inertia_of
 from beaver_ftc.diagnosis import readout as of_diagnosis
-from beaver_ftc.diagnosis.readout import DiagnosisReadout
+from beaver_ftc.diagnosis.readout import DiagnosisReadout, Readout, value
 from beaver_ftc.loop.assembly import y_places
 from beaver_ftc.plant.channels import AIRSPEED, ALTITUDE
 
@@ -36,119 +36,67 @@ class Actuators(NamedTuple):
     step_rad: np.ndarray
 
 
-class FrameReadout:
-    """A flight at the frame in which it is read first; see the types of what it returns."""
+class FrameReadout(Readout):
+    """A flight at the frame in which it is read first; see the types of what it returns.
 
-    def __init__(self, frame: np.void) -> None:
-        self._frame = frame
+    since, k                     number of the frame with which this diagnosis began, and of the coming frame
+    dt_s                         duration of a frame, s
+    rates_rad_s, alpha_rad       measured p, q, r, (3,) rad/s, and angle of attack, rad
+    missing_sensors              numbers of the sensors without a reading in this frame
+    expected_u_rad               positions that the actuators' model gives, (surfaces,) rad
+    G, mean_G                    effectiveness by the design model, (3, surfaces) rad/s2 per rad: at this
+                                 instant, and the mean over the elapsed frame
+    model_rad_s2                 f + G u by the design model, mean over the elapsed frame, (3,) rad/s2
+    inertia                      inertia coefficients of the design model, SI
+    height_m, airspeed_mps       true height above sea level, m, and true airspeed, m/s
+    envelope_exits               how often the flight has left its declared envelope so far
+    diagnosis, control           the diagnosis, and the law
+    """
 
-    @cached_property
-    def since(self) -> int:
-        """The frame with which this diagnosis began."""
-        return int(self._frame["since"])
-
-    @cached_property
-    def k(self) -> int:
-        """Number of the coming frame."""
-        return int(self._frame["k"])
-
-    @cached_property
-    def dt_s(self) -> float:
-        """Duration of a frame, s."""
-        return float(self._frame["dt"])
-
-    @cached_property
-    def rates_rad_s(self) -> np.ndarray:
-        """Measured p, q, r, (3,) rad/s."""
-        return np.array(self._frame["measured"]["x"])
-
-    @cached_property
-    def alpha_rad(self) -> float:
-        """Measured angle of attack, rad."""
-        return float(self._frame["measured"]["y"][0])
-
-    @cached_property
-    def missing_sensors(self) -> np.ndarray:
-        """Numbers of the sensors without a reading in this frame."""
-        return np.flatnonzero(self._frame["measured"]["missing"])
-
-    @cached_property
-    def expected_u_rad(self) -> np.ndarray:
-        """Positions that the actuators' model gives, (surfaces,) rad."""
-        return np.array(self._frame["prediction"]["u"])
+    since = value(int, "since")
+    k = value(int, "k")
+    dt_s = value(float, "dt")
+    rates_rad_s = value(np.array, "measured", "x")
+    alpha_rad = value(float, "measured", "y", 0)
+    missing_sensors = value(np.flatnonzero, "measured", "missing")
+    expected_u_rad = value(np.array, "prediction", "u")
+    G = value(np.array, "prediction", "G")
+    mean_G = value(np.array, "prediction", "means", "G")
+    model_rad_s2 = value(np.array, "prediction", "means", "F")
+    inertia = value(inertia_of, "prediction", "design")
+    height_m = value(float, "truth", "value", ALTITUDE)
+    airspeed_mps = value(float, "truth", "value", AIRSPEED)
+    envelope_exits = value(int, "accounts", "envelope", "n_exits")
+    diagnosis = value(DiagnosisReadout, "fdi")
+    control = value(ControlReadout, "control")
 
     @cached_property
     def actuators(self) -> Actuators:
         """The declared actuators."""
-        actuators = self._frame["prediction"]["actuators"]
+        actuators = self._record["prediction"]["actuators"]
         return Actuators(*(actuators[name].copy() for name in ("low", "high", "approach", "step")))
-
-    @cached_property
-    def G(self) -> np.ndarray:
-        """Effectiveness by the design model at this instant, (3, surfaces) rad/s2 per rad."""
-        return np.array(self._frame["prediction"]["G"])
-
-    @cached_property
-    def mean_G(self) -> np.ndarray:
-        """The same, mean over the elapsed frame."""
-        return np.array(self._frame["prediction"]["means"]["G"])
-
-    @cached_property
-    def model_rad_s2(self) -> np.ndarray:
-        """f + G u by the design model, mean over the elapsed frame, (3,) rad/s2."""
-        return np.array(self._frame["prediction"]["means"]["F"])
-
-    @cached_property
-    def inertia(self) -> InertiaCoefficients:
-        """The inertia coefficients of the design model, SI."""
-        return inertia_of(self.design)
 
     @cached_property
     def design(self) -> np.void:
         """The design model's record, not a copy, for the functions of `design.model`."""
-        return self._frame["prediction"]["design"]
+        return self._record["prediction"]["design"]
 
     @cached_property
     def true_signals(self) -> np.ndarray:
         """The measured signals beside the rates without errors, in the order of y, SI."""
-        truth = self._frame["truth"]
-        return np.asarray((truth["value"] * truth["factor"])[y_places(self._frame)])
-
-    @cached_property
-    def height_m(self) -> float:
-        """True height above sea level, m."""
-        return float(self._frame["truth"]["value"][ALTITUDE])
-
-    @cached_property
-    def airspeed_mps(self) -> float:
-        """True airspeed, m/s."""
-        return float(self._frame["truth"]["value"][AIRSPEED])
+        truth = self._record["truth"]
+        return np.asarray((truth["value"] * truth["factor"])[y_places(self._record)])
 
     @cached_property
     def origin(self) -> Origin:
         """Where the flight starts."""
         names = "latitude_0", "longitude_0", "radius_m", "parallel_radius_m"
-        return Origin(*(float(self._frame["truth"][name]) for name in names))
-
-    @cached_property
-    def envelope_exits(self) -> int:
-        """How often the flight has left its declared envelope so far."""
-        return int(self._frame["accounts"]["envelope"]["n_exits"])
+        return Origin(*(float(self._record["truth"][name]) for name in names))
 
     @cached_property
     def alarmed(self) -> bool:
         """Whether an alarm of the built-in diagnosis stands, of surfaces or of sensors."""
-        return any(map(bool, of_diagnosis.alarm_flags(self._frame["fdi"])))
-
-    @cached_property
-    def diagnosis(self) -> DiagnosisReadout:
-        """The diagnosis."""
-        return DiagnosisReadout(self._frame["fdi"])
-
-    @cached_property
-    def control(self) -> ControlReadout:
-        """The law."""
-        return ControlReadout(self._frame["control"])
+        return any(map(bool, of_diagnosis.alarm_flags(self._record["fdi"])))
 
 
 class Instruments:

@@ -60,7 +60,7 @@ def _log(frames: np.ndarray, flown: Iterable[int], scenario: Scenario, recorder:
         monitor = diagnosis.sensor_monitor
         if monitor.enabled:
             further |= {"watch_share": monitor.top_ratio, "watch_test": monitor.worst_test_index}
-            further["watch_missing"] = next(iter(frame.missing_sensors), nan)
+            further["watch_missing"] = float(next(iter(frame.missing_sensors), nan))
         # The order of the columns.
         numbers = [frame.alarmed, *diagnosis.is_estimator_excluded, *further.values()]
         rows.append(np.concatenate([[k / scenario.rate_hz], *vectors, numbers]))

@@ -16,7 +16,7 @@ from beaver_ftc_logs.flight_states import build_noise, build_states
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recording import Floats
 from beaver_ftc_logs.regression import Innovations, by_noise, innovations
-from beaver_ftc_logs.runs import trailing_sums
+from beaver_ftc_logs.runs import shifted, trailing_sums
 from beaver_ftc_logs.samples import Samples
 
 _EVIDENCE_MEMORY_S = 600.0  # memory of the comparison of delays or noise models
@@ -79,12 +79,8 @@ def _with_command_delay(samples: Samples, delay_s: float) -> Samples:
     A delayed command is interpolated between two samples. The model uses commands from one sample before the
     rates, so a negative delay needs no later command than that of the same sample.
     """
-    if delay_s == 0.0:
-        return samples
-    share = min(abs(delay_s) / samples.dt_s, 1.0)
-    u = samples.commands
-    neighbour = np.vstack([u[:1], u[:-1]] if delay_s > 0 else [u[1:], u[-1:]])
-    return replace(samples, commands=(1.0 - share) * u + share * neighbour)
+    n = np.clip(-delay_s / samples.dt_s, -1.0, 1.0)
+    return replace(samples, commands=shifted(samples.commands, n))
 
 
 def model_weights(ll: Sequence[Floats], rate_hz: float) -> Floats:

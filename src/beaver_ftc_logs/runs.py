@@ -15,6 +15,12 @@ from beaver_ftc_logs.recording import Floats, Ints, Mask
 Runs = list[tuple[int, int]]
 
 
+def shifted(values: Floats, n: float) -> Floats:
+    """Values (n_rows, S) that act `n` samples later than these, i.e. that were logged n samples earlier."""
+    rows = np.arange(len(values)) + n
+    return np.column_stack([np.interp(rows, np.arange(len(values)), column) for column in values.T])
+
+
 def last_true_row(mask: Mask) -> Ints:
     """For each row the last row up to it at which a mask (n,) is true, (n,); -1 before the first such row."""
     return np.maximum.accumulate(np.where(mask, np.arange(len(mask)), -1))

@@ -8,7 +8,7 @@ from beaver_ftc.documents import BadInput
 from beaver_ftc_logs import signals
 from beaver_ftc_logs.recording import Column, Floats, Ints, Mask
 from beaver_ftc_logs.refusals import refusal
-from beaver_ftc_logs.runs import last_row_at
+from beaver_ftc_logs.runs import runs_between
 from beaver_ftc_logs.units import TIME_UNITS
 
 MIN_HZ = 4.0  # least sample rate of the body rates
@@ -31,14 +31,18 @@ def sample_times(flight: str, stamps: Floats, max_hz: float) -> tuple[Floats, In
     if 1.0 / step_s <= _ALIKE_RATIO * max_hz:
         return stamps, np.cumsum(np.diff(stamps, prepend=stamps[0]) > _MIN_GAP_STEPS * step_s), step_s
     step_s = 1.0 / max_hz
-    t_s, stretch = _even_times(stamps, step_s)
+    grids = [
+        stamps[begin] + step_s * np.arange((stamps[end - 1] - stamps[begin]) / step_s + 0.5)
+        for begin, end in runs_between(np.diff(stamps) > _MIN_GAP_STEPS * step_s)
+    ]
+    t_s = np.concatenate(grids)
     if len(t_s) < _MIN_ROWS:
         raise refusal(
             flight,
             f"{n} rows within {stamps[-1] - stamps[0]:.3g} s are {len(t_s)} samples at {max_hz:g} Hz",
             f"at least {_MIN_ROWS}; is time in another unit?",
         )
-    return t_s, stretch, step_s
+    return t_s, np.repeat(np.arange(len(grids)), [*map(len, grids)]), step_s
 
 
 def _refuse_rate(flight: str, rate_hz: float) -> None:
@@ -53,21 +57,6 @@ def _refuse_rate(flight: str, rate_hz: float) -> None:
         )
     if rate_hz > _MAX_HZ:
         raise BadInput(f"{logged}, allowed: up to {_MAX_HZ:g} Hz, time in seconds")
-
-
-def _even_times(stamps: Floats, step_s: float) -> tuple[Floats, Ints]:
-    """Times and stretches as in `sample_times`: samples one step apart in each stretch of the log, from its
-    first stamp on.
-
-    begin, last: first and last row of each stretch in the log; counts: number of its samples; index (n,):
-    number of each sample in its stretch.
-    """
-    begin = np.flatnonzero(np.diff(stamps, prepend=-np.inf) > _MIN_GAP_STEPS * step_s)
-    last = np.append(begin[1:], len(stamps)) - 1
-    counts = np.ceil((stamps[last] - stamps[begin]) / step_s + 0.5).astype(np.int64)
-    stretch = np.repeat(np.arange(len(begin)), counts)
-    index = np.arange(len(stretch)) - np.repeat(np.cumsum(counts) - counts, counts)
-    return stamps[begin][stretch] + index * step_s, stretch
 
 
 def median_step_s(stamps: Floats) -> float:
@@ -109,9 +98,7 @@ def _held_age_s(column: Column, t_s: Floats) -> Floats:
 
 def latest_values(t_s: Floats, stamps: Floats, values: Floats) -> Floats:
     """The value of the last stamp up to each time, nan before the first."""
-    if not len(stamps):
-        return np.full(len(t_s), np.nan)
-    return np.where(t_s < stamps[0], np.nan, values[last_row_at(stamps, t_s)])
+    return np.append(np.nan, values)[np.searchsorted(stamps, t_s, side="right")]
 
 
 def _means(column: Column, t: Floats, h: float, held: Floats) -> Floats:

@@ -5,7 +5,7 @@ the acceleration along z is 1 g. named: the columns of p, q and r by name, in th
 `physics`.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -35,45 +35,39 @@ _RATE_TITLES = ("roll rate", "pitch rate", "yaw rate")
 def attitude_mistake(named: Columns, angles: Sequence[NamedColumn | None], others: Columns) -> str | None:
     """Text of the first mistake in the rates or the angles of roll, pitch and yaw; None if there is none.
 
+    Of each axis: the size of a pitch angle; then, if rate and angle agree, the slope; otherwise other columns
+    and other units of the rate that agree with the angle.
+
     angles: None where one is not known. others: columns that may have been exchanged with a rate.
     """
-    mistakes = (text for axis in range(3) for text in _mistakes_of_axis(named, angles, others, axis))
-    return next(mistakes, None)
-
-
-def _mistakes_of_axis(
-    named: Columns, angles: Sequence[NamedColumn | None], others: Columns, axis: int
-) -> Iterator[str]:
-    """Yield the texts of mistakes in one rate and its angle: the size of a pitch angle; then, if rate and
-    angle agree, the slope; otherwise other columns and other units of the rate that agree with the angle."""
-    angle = angles[axis]
-    rate = [*named][axis]
-    if angle is None:
-        return
-    if axis == 1 and (remark := _pitch_remark(*angle)):
-        yield remark
-    fit = _fit_with(named, angles, axis, named[rate])
-    if fit is None:
-        return
-    if abs(fit.correlation) >= _AGREEING:
-        if remark := _factor_remark(fit, (rate, named[rate]), angle):
-            yield remark
-        return
-    for name, column in (named | others).items():
-        trial = _fit_with(named, angles, axis, column)
-        if trial is not None and abs(trial.correlation) > _CLOSE:
-            yield (
-                f"{angle[0]} does not follow {rate} (correlation {fit.correlation:.2f}) "
-                f"but {name} ({trial.correlation:.2f}): {name} is the {_RATE_TITLES[axis]}"
-            )
-    # In a banked flight, q turns the yaw angle too, so a yaw rate in another unit need not correlate with it.
-    for factor in UNIT_FACTORS:
-        scaled = replace(named[rate], values=factor * named[rate].values)
-        if _is_exact(_fit_with(named, angles, axis, scaled)):
-            yield (
-                f"the {_RATE_TITLES[axis]} {rate} does not make the change of its angle "
-                f"(correlation {fit.correlation:.2f}): a factor of {factor:.4g} on {rate} fits"
-            )
+    for axis, (angle, rate) in enumerate(zip(angles, named, strict=True)):
+        if angle is None:
+            continue
+        if axis == 1 and (remark := _pitch_remark(*angle)):
+            return remark
+        fit = _fit_with(named, angles, axis, named[rate])
+        if fit is None:
+            continue
+        if abs(fit.correlation) >= _AGREEING:
+            if remark := _factor_remark(fit, (rate, named[rate]), angle):
+                return remark
+            continue
+        for name, column in (named | others).items():
+            trial = _fit_with(named, angles, axis, column)
+            if trial is not None and abs(trial.correlation) > _CLOSE:
+                return (
+                    f"{angle[0]} does not follow {rate} (correlation {fit.correlation:.2f}) "
+                    f"but {name} ({trial.correlation:.2f}): {name} is the {_RATE_TITLES[axis]}"
+                )
+        # In a banked flight, q turns the yaw angle too: a yaw rate in another unit need not follow it.
+        for factor in UNIT_FACTORS:
+            scaled = replace(named[rate], values=factor * named[rate].values)
+            if _is_exact(_fit_with(named, angles, axis, scaled)):
+                return (
+                    f"the {_RATE_TITLES[axis]} {rate} does not make the change of its angle "
+                    f"(correlation {fit.correlation:.2f}): a factor of {factor:.4g} on {rate} fits"
+                )
+    return None
 
 
 def _fit_with(

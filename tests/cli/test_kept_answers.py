@@ -17,7 +17,7 @@ KEPT = (".acmi", ".html", ".json", ".md", ".xml", ".yaml")
 # What hangs on the day, the machine and the code, and what pages have to look well.
 APART = re.compile(
     r'\d{4}-\d\d-\d\d \d\d:\d\d UTC|(?<=")[0-9a-f]{16,}(?=")|(beaver-ftc|jsbsim|numpy|numba|python) \d[.\d]+'
-    r"|<(style|script)\b.*?</\2>"
+    r"|(?<=Plan )[0-9a-f]{64}|(?<=flight code )[0-9a-f]{16}|<(style|script)\b.*?</\2>"
     r"|(?<=(?:eri|rit)(?:ved|ten) in )[\d.]+|(?<= time=\")[\d.]+|^[\w ]+: \d+%(, \d+ \w+ left)?$",
     re.DOTALL | re.MULTILINE,
 )

@@ -26,6 +26,7 @@ from beaver_ftc_logs.refusals import refusal
 from beaver_ftc_logs.units import TIME_UNITS
 
 TIME_COLUMN = "t_s"
+_BROKEN_SHARE = 0.1  # largest share of lines with another number of cells than the header
 
 NumberTable = dict[str, Floats]
 
@@ -45,14 +46,14 @@ def read_parts(
     part.
     """
     name, unit = time or (TIME_COLUMN, "s")
-    table = _Table(path)
-    parts = table.parts(None if columns is None else {name, *columns}, part_rows)
+    table = _open(path)
+    parts = _parts(path, table, None if columns is None else {name, *columns}, part_rows)
     if name not in table.names:
         allowed = f"a table with {TIME_COLUMN} in seconds, or its `time` in the vehicle file"
         nearest = nearest_names_text(name, table.names)
         raise refusal(path, f"no column {name}", f"{allowed}; it has {nearest}")
     for part, (cells, has_more) in enumerate(parts, 1):
-        numbers = table.whole(cells)
+        numbers = _whole(table, cells)
         t_s = numbers.pop(name) * TIME_UNITS[unit]
         kept, left_out = _timed_rows(path, name, t_s, cells)
         check_time(path, t_s[kept], name, cells.n_rows_before + 1 + np.flatnonzero(kept))
@@ -85,19 +86,19 @@ def read_numbers(path: Path, columns: Sequence[str] | None = None) -> NumberTabl
     """The numbers of the columns of a table, nan where there is none: of all columns, or of those named that
     the table has. Raises BadInput if the file is no table, or larger than any flight.
     """
-    table = _Table(path)
-    numbers = table.whole(next(table.parts(columns))[0])
+    table = _open(path)
+    numbers = _whole(table, next(_parts(path, table, columns))[0])
     return {name: values for name, values in numbers.items() if columns is None or name in columns}
 
 
 def column_names(path: Path) -> list[str]:
     """The names of the columns of a table. Raises BadInput if the file is no table."""
-    return list(_Table(path).names)
+    return list(_open(path).names)
 
 
 def first_cells_of_column(path: Path, name: str) -> TableCells:
     """The first BATCH_ROWS cells of a column, or all if there are at most LAST_PART_FACTOR times as many."""
-    return next(_Table(path).parts([name], BATCH_ROWS))[0]
+    return next(_parts(path, _open(path), [name], BATCH_ROWS))[0]
 
 
 def check_time(path: Path, t_s: Floats, time: str = TIME_COLUMN, rows: Ints | None = None) -> None:
@@ -124,57 +125,55 @@ def _read_errors(path: Path) -> Iterator[None]:
         raise unreadable_error(path, reason) from None
 
 
-class _Table:
-    """The table in a file: its names, and its cells in parts. Raises BadInput if the file is no table."""
+def _open(path: Path) -> TextTable | ParquetTable:
+    """The table in a file. Raises BadInput if the file is no table."""
+    check_is_log_itself(path)
+    with _read_errors(path):
+        return ParquetTable(path) if path.suffix.lower() == ".parquet" else TextTable.find(path)
 
-    def __init__(self, path: Path) -> None:
-        check_is_log_itself(path)
-        self._path = path
-        with _read_errors(path):
-            self._file_table = (
-                ParquetTable(path) if path.suffix.lower() == ".parquet" else TextTable.find(path)
-            )
-        self.names = self._file_table.names
-        self.remarks = self._file_table.remarks
 
-    def parts(self, columns: Wanted, part_rows: int | None = None) -> Iterator[tuple[TableCells, bool]]:
-        """The columns that are wanted, all if None, in parts of part_rows rows, one part if None; and whether
-        there are further parts. Raises BadInput for a wanted name that several columns have.
-        """
-        doubled = self._file_table.doubled_names
-        ambiguous = sorted(name for name in doubled if columns is not None and name in columns)
-        if ambiguous:
-            raise refusal(self._path, f"has two columns {ambiguous[0]}", "one of a name")
-        readable = [name for name in self._file_table.readable_names if name not in doubled]
-        wanted = [name for name in readable if columns is None or name in columns]
-        return self._join_blocks(self._file_table.blocks(self._path, wanted), part_rows)
+def _parts(
+    path: Path, table: TextTable | ParquetTable, columns: Wanted, part_rows: int | None = None
+) -> Iterator[tuple[TableCells, bool]]:
+    """Yield the columns that are wanted, all if None, in parts of part_rows rows that overlap, one part if
+    None; and whether further parts follow. Raises BadInput for a wanted name that several columns have.
 
-    def _join_blocks(
-        self, blocks: Iterator[TableCells], part_rows: int | None
-    ) -> Iterator[tuple[TableCells, bool]]:
-        """Yield the table in parts that overlap, and whether further parts follow; in one part if part_rows
-        is None. held: the blocks of the next part so far, which begin with the end of the part before.
-        """
-        held: list[TableCells] = []
-        with _read_errors(self._path):
-            for block in blocks:
-                held.append(block)
-                n_held = sum(held_block.n_rows for held_block in held)
-                if part_rows is None and n_held > MAX_ROWS:
-                    reason = f"has more than {MAX_ROWS:,} rows, allowed: up to {MAX_ROWS:,}"
-                    raise BadInput(f"{self._path}: {reason}")
-                while part_rows is not None and n_held > LAST_PART_FACTOR * part_rows:
-                    joined = join_blocks(held)
-                    self._file_table.check_broken_lines(self._path, joined)
-                    remainder = joined.select_rows(part_rows - round(PART_OVERLAP_SHARE * part_rows))
-                    held = [remainder]
-                    n_held = remainder.n_rows
-                    yield joined.select_rows(0, part_rows, with_remarks=True), True
-            joined = join_blocks(held)
-            self._file_table.check_broken_lines(self._path, joined)
-            yield joined, False
+    held: the blocks of the next part so far, which begin with the end of the part before.
+    """
+    doubled = table.doubled_names
+    ambiguous = sorted(name for name in doubled if columns is not None and name in columns)
+    if ambiguous:
+        raise refusal(path, f"has two columns {ambiguous[0]}", "one of a name")
+    wanted = [name for name in table.names if name not in doubled and (columns is None or name in columns)]
+    held: list[TableCells] = []
+    with _read_errors(path):
+        for block in table.blocks(path, wanted):
+            held.append(block)
+            n_held = sum(held_block.n_rows for held_block in held)
+            if part_rows is None and n_held > MAX_ROWS:
+                reason = f"has more than {MAX_ROWS:,} rows, allowed: up to {MAX_ROWS:,}"
+                raise BadInput(f"{path}: {reason}")
+            while part_rows is not None and n_held > LAST_PART_FACTOR * part_rows:
+                joined = _joined(path, table, held)
+                remainder = joined.select_rows(part_rows - round(PART_OVERLAP_SHARE * part_rows))
+                held = [remainder]
+                n_held = remainder.n_rows
+                yield joined.select_rows(0, part_rows, with_remarks=True), True
+        yield _joined(path, table, held), False
 
-    def whole(self, cells: TableCells) -> NumberTable:
-        """The cells of all columns; a column that was not read is nan."""
-        blank = np.broadcast_to(np.nan, cells.n_rows)
-        return {name: cells.numbers.get(name, blank) for name in self.names}
+
+def _joined(path: Path, table: TextTable | ParquetTable, held: list[TableCells]) -> TableCells:
+    """The blocks as one. Raises BadInput if too many lines have another number of cells than the header."""
+    cells = join_blocks(held)
+    n_broken = len(cells.broken_lines)
+    n_lines = cells.n_rows + n_broken
+    if n_broken > _BROKEN_SHARE * n_lines:
+        reason = f"{n_broken} of {n_lines} lines have another number of cells than the header"
+        raise unreadable_error(path, f"{reason}, {len(table.names)}: the first {cells.broken_lines[0]!r}")
+    return cells
+
+
+def _whole(table: TextTable | ParquetTable, cells: TableCells) -> NumberTable:
+    """The cells of all columns; a column that was not read is nan."""
+    blank = np.broadcast_to(np.nan, cells.n_rows)
+    return {name: cells.numbers.get(name, blank) for name in table.names}

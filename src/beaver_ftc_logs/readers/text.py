@@ -24,8 +24,6 @@ _LAYOUT_HEAD_BYTES = 200_000  # the layout of a file is found from its first byt
 _MAX_LAYOUT_LINES = 60  # and from these lines of them at most
 _BLOCK_BYTES = 1_000_000  # number of bytes that are read at once
 _NUMBER_PATTERN = r"^[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?$"
-# Largest share of lines with another number of cells than the header.
-_BROKEN_SHARE = 0.1
 
 
 @dataclass(frozen=True)
@@ -42,11 +40,6 @@ class TextTable:
     delimiter: str
     decimal_mark: str
     doubled_names: frozenset[str]
-
-    @property
-    def readable_names(self) -> tuple[str, ...]:
-        """The columns that may hold numbers: all."""
-        return self.names
 
     @classmethod
     def find(cls, path: Path) -> "TextTable":
@@ -98,14 +91,6 @@ class TextTable:
             yield f"cells are parted by {_DELIMITER_TITLES[self.delimiter]}{comma}"
         if cells.broken_lines:
             yield f"lines with too few or too many cells, left out: {len(cells.broken_lines)}"
-
-    def check_broken_lines(self, path: Path, cells: TableCells) -> None:
-        """Raise BadInput if too many lines have another number of cells than the header."""
-        n_broken = len(cells.broken_lines)
-        n_lines = cells.n_rows + len(cells.broken_lines)
-        if n_broken > _BROKEN_SHARE * n_lines:
-            reason = f"{n_broken} of {n_lines} lines have another number of cells than the header"
-            raise unreadable_error(path, f"{reason}, {len(self.names)}: the first {cells.broken_lines[0]!r}")
 
     def blocks(self, path: Path, wanted: Sequence[str]) -> Iterator[TableCells]:
         """The numbers of some columns in blocks, at least one. Every cell is read as text and then converted

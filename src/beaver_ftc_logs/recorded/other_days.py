@@ -23,6 +23,7 @@ from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recorded import benchmark
 from beaver_ftc_logs.recording import Floats
 from beaver_ftc_logs.refusals import refusal
+from beaver_ftc_logs.runs import shifted
 from beaver_ftc_logs.samples import Samples, mixer_matrix
 
 TUNING_SEEDS = range(8)
@@ -114,7 +115,7 @@ def apply_day_changes(day: DayChanges, samples: Samples, A: Floats, Q: Floats) -
     """
     rng = np.random.default_rng(_SEED)
     e = np.where(samples.labels > 0.0, samples.labels, 1.0)
-    commands = _shifted(samples.commands, day.command_delay_s / samples.dt_s)
+    commands = shifted(samples.commands, day.command_delay_s / samples.dt_s)
     trim = _running_mean(commands, round(_TRIM_MEAN_S / samples.dt_s))
     commands = trim + day.motion_scale * (commands - trim) / (day.common_gain * day.surface_gains)
     drift = day.trim_drift_sd_commands * _coloured_noise(rng, commands.shape, _DRIFT_TIME_S / samples.dt_s)
@@ -124,12 +125,6 @@ def apply_day_changes(day: DayChanges, samples: Samples, A: Floats, Q: Floats) -
     extra = np.sqrt(max(day.noise_ratio**2 - min(day.motion_scale, 1.0) ** 2, 0.0))
     rates = rates + extra * _response_to_noise(rng, A, Q, len(rates))
     return replace(samples, commands=commands, rates=rates)
-
-
-def _shifted(values: Floats, n: float) -> Floats:
-    """Values (n_rows, S) that act `n` samples later than these, i.e. that were logged n samples earlier."""
-    rows = np.arange(len(values)) + n
-    return np.column_stack([np.interp(rows, np.arange(len(values)), column) for column in values.T])
 
 
 def _running_mean(values: Floats, n: int) -> Floats:

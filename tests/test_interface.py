@@ -128,10 +128,10 @@ class TestSweep:
             "print('started')\n"
             "base = bf.load('elevator-partial-loss').with_({'duration_s': 13.0})\n"
             "vary = {'faults[0].magnitude': {'uniform': [0.2, 1.0]}}\n"
-            "print(len(bf.sweep(base, vary=vary, runs=3, workers=2)))\n"
+            "print(len(bf.sweep(base, vary=vary, runs=3, workers=2)), 'study' in __file__)\n"
         )
         done = subprocess.run([sys.executable, script], capture_output=True, text=True, check=False)
-        assert done.stdout.split() == ["started", "3"], done.stderr
+        assert done.stdout.split() == ["started", "3", "True"], done.stderr
 
 
 @pytest.mark.parametrize(

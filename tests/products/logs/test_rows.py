@@ -54,7 +54,7 @@ def test_a_loss_of_surfaces_that_move_together_has_no_lower_bound():
     assert found.effectiveness_low[0, [0, 2]].tolist() == [0.0, 0.0]
 
 
-RIGHT, LEFT, BOTH = (0.5, 1.0), (1.0, 0.25), (0.5, 0.25)
+SOUND, RIGHT, LEFT, BOTH = (1.0, 1.0), (0.5, 1.0), (1.0, 0.25), (0.5, 0.25)
 
 
 def test_names_under_other_laws(monkeypatch):
@@ -66,7 +66,7 @@ def test_names_under_other_laws(monkeypatch):
     reach = round(WING.rate_hz)
     gained = np.concatenate([[1.0, 1.0, 5.0, 1.0], np.zeros(2 * reach + 2)])
     monkeypatch.setattr(posterior_rows, "fault_evidence", lambda posterior, bank: gained)
-    shares = [{LEFT: 1.0}] * 4 + [{BOTH: 0.6, LEFT: 0.4}] + [{RIGHT: 1.0}] * (2 * reach + 1)
+    shares = [{LEFT: 1.0}] * 4 + [{BOTH: 0.6, LEFT: 0.4}] + [{RIGHT: 0.6, SOUND: 0.4}] * (2 * reach + 1)
     bank = build_bank(model)
 
     def named_by(of):

@@ -213,9 +213,6 @@ def test_a_document_and_its_files(tmp_path, monkeypatch, few_cells, changed):
     assert document.pop("versions")
     assert document.pop("folder").startswith(str(tmp_path))
     assert not changed(document, relative=1e-3)
-    assert document["draws"] == 1
-    assert [row["mechanism"] for row in document["mechanisms"]] == [each.name for each in MECHANISMS]
-    assert document["margins"][0]["gain_margin_db"] > 6.0
     alarms = next(row for row in document["false_alarms"] if row["flown"] == DEFAULT)
     assert (alarms["count"], alarms["certified"], alarms["unexplained"]) == (1, 1, 0)
     folder = tmp_path / "mechanisms-sensitivity"

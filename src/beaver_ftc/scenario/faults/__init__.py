@@ -168,7 +168,7 @@ def _wrong(case: str) -> str | None:
         return f"{aircraft.name} declares no damage, allowed: an aircraft that does"
     if case in aircraft.damage:
         return None
-    return f"{case[:100]!r} is not known{suggestion(case, tuple(aircraft.damage))}"
+    return f"{case!r:.100} is not known{suggestion(case, tuple(aircraft.damage))}"
 
 
 class Damage(Switched):

@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from beaver_ftc.aircraft.schema import ThrustSection
+from beaver_ftc.control.power import POWER, move_differences
 from beaver_ftc.control.thrust import (
     ENGINE,
     gained,
@@ -49,3 +50,9 @@ def test_the_power_for_an_acceleration_gives_it(airspeed_mps, trim, power):
 @pytest.mark.parametrize(("wanted", "power"), [(-50.0, 0.0), (50.0, 1.0)])
 def test_what_no_power_gives_is_asked_of_the_end(wanted, power):
     assert power_for(engine_of(), 0.0, 0.5, wanted) == power
+
+
+def test_each_engine_moves_towards_its_own_difference():
+    power = np.zeros(1, POWER).view(np.recarray)[0]
+    move_differences(power, (0.2, -0.3), 2, 0.25)
+    assert power.output.command[:3].tolist() == [0.0, 0.2, -0.25]

@@ -16,6 +16,7 @@ from pydantic import (
     AfterValidator,
     BeforeValidator,
     Field,
+    ValidationError,
     ValidationInfo,
     create_model,
     model_validator,
@@ -24,12 +25,14 @@ from pydantic import (
 from beaver_ftc.aircraft import DEFAULT, Aircraft, load
 from beaver_ftc.aircraft.aircraft import BESIDE, NotDerived, UnknownAircraft
 from beaver_ftc.documents.document import (
+    Document,
     Flag,
     Number,
     Section,
     deny,
     entry,
     number,
+    refuse,
     refuse_unknown,
 )
 from beaver_ftc.documents.errors import BeaverFtcError, suggestion
@@ -229,7 +232,14 @@ def given_initial(given: Any) -> Any:
     model = initial_of(checked_aircraft())
     if isinstance(given, dict):  # the JSON Schema has the keys of one aircraft alone
         refuse_unknown((key for key in given if key not in model.model_fields), model.model_fields)
-    return model.model_validate(given)
+    try:
+        return model.model_validate(given)
+    except ValidationError as error:
+        from beaver_ftc.documents.allowed import problems_of  # what is right needs no words
+
+        found = problems_of(error, Document(given), model.model_json_schema())
+        refuse((problem.location, problem.says) for problem in found)
+        raise
 
 
 def default_initial() -> Initial:

@@ -26,6 +26,7 @@ from beaver_ftc_logs.log_rows import LogRows
 from beaver_ftc_logs.model import FilterSettings, Model
 from beaver_ftc_logs.recording import RecordedFlight
 from beaver_ftc_logs.refusals import refusal
+from beaver_ftc_logs.replay import is_log_of_run
 from beaver_ftc_logs.samples import Samples, resample
 from beaver_ftc_logs.validation import add_ranges_and_threshold, score_folds
 from beaver_ftc_logs.vehicle import Vehicle, load_vehicle
@@ -78,7 +79,8 @@ def _load_data_set(path: Path) -> DataSet | None:
     if not path.is_dir():
         return None
     if (path / VEHICLE_FILE).is_file():
-        paths = sorted([*path.glob("*.csv"), *path.glob("*.parquet")])
+        tables = (*path.glob("*.csv"), *path.glob("*.parquet"))
+        paths = sorted(table for table in tables if not is_log_of_run(table))  # its flight lies beside it
         return _read_data_set(path.name, load_vehicle(path / VEHICLE_FILE), paths) if paths else None
     folders = sorted(sub for sub in path.iterdir() if sub.is_dir() and any(sub.glob(_ALFA_GYRO_FILES)))
     return _read_data_set(path.name, load_vehicle("alfa"), folders) if folders else None

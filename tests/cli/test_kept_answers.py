@@ -25,11 +25,11 @@ APART = re.compile(
 
 @pytest.fixture
 def figures(monkeypatch):
-    """What each figure shows that is saved, by file name. One process does everything, and takes no time."""
+    """What the figures of each file name show that are saved. One process does everything, in no time."""
     found, save = {}, Figure.savefig
 
     def saved(figure, to, **options):
-        found[getattr(to, "name", f"{len(found)}")] = shown(figure)
+        found.setdefault(getattr(to, "name", f"{len(found)}"), []).append(shown(figure))
         save(figure, to, **options | {"dpi": 10})
 
     monkeypatch.setattr(Figure, "savefig", saved)
@@ -46,12 +46,13 @@ def test_an_answer_says_and_shows_what_is_kept(name, figures, changed, tmp_path)
     for file, text in GIVEN["files"].items():
         (tmp_path / file).write_text(text)
     said = [beaver(*line.split(), cwd=tmp_path) for line in GIVEN["answers"][name]]
-    written = sorted(file for file in tmp_path.rglob("*.*") if file.name not in GIVEN["files"])
+    files = sorted(file for file in tmp_path.rglob("*.*") if file.name not in GIVEN["files"])
+    written = {str(file.relative_to(tmp_path)): file for file in files}
     assert not changed(
         {
             "said": [[one.returncode, *_read(one.stdout), *_read(one.stderr)] for one in said],
-            "written": {file.name: _read(file.read_text()) for file in written if file.suffix in KEPT},
-            "files": [file.name for file in written],
+            "written": {of: _read(file.read_text()) for of, file in written.items() if file.suffix in KEPT},
+            "files": [*written],
             "figures": figures,
         },
         relative=1e-3,

@@ -1,6 +1,9 @@
 """Sections against each other: what is said of contradictions and of what is unwise, right at each bound."""
 
+from pathlib import Path
+
 import pytest
+import yaml
 
 from beaver_ftc.documents.report import ScenarioError
 from beaver_ftc.scenario.schema import load, load_text
@@ -79,82 +82,6 @@ def test_what_contradictions_are_called(changed):
     assert not changed(found)
 
 
-UNWISE = {
-    "nothing": {},
-    "no diagnosis": {"fdi": {"scheme": "none"}, "uncertainty": {"cg_m": [0.1, 0, 0]}},
-    "many sensors": {"sensors": "tactical-grade"},
-    "a sensor of no preset": {"sensors": {"p": {"bias_deg_s": 50}}},
-    "sensors that are declared": {
-        "sensors": "tactical-grade", "fdi": {"bounds": {"sensors": "tactical-grade"}},
-    },
-    "coefficients at the bound": {
-        "uncertainty": {"coefficients": {"Cm_q": 1.1, "Cm_alpha": 0.9, "Cn_r": 1.2, "Cl_p": 1.01, "CZ_q": 3}},
-        "fdi": {"bounds": {"coefficients": {"Cm_q": 0.1, "Cm_alpha": 0.099999, "Cn_r": 0.2}}},
-    },
-    "inertia at the bound": {
-        "uncertainty": {"inertia": {"Ix": 1.1, "Iy": 0.9, "Iz": 1.100001}},
-        "fdi": {"bounds": {"inertia": 0.1}},
-    },
-    "turbulence": {"environment": {"turbulence": "dryden", "severity": "severe"}},
-    "turbulence low": {
-        "environment": {"turbulence": "dryden", "severity": "light"}, "initial": {"altitude_m": 609.5},
-        "fdi": {"bounds": {"turbulence": "moderate"}},
-    },
-    "turbulence high": {
-        "environment": {"turbulence": "dryden", "severity": "light"}, "initial": {"altitude_m": 609.6},
-        "fdi": {"bounds": {"turbulence": "light"}},
-    },
-    "gusts": {"environment": {"gust": [
-        {"at_s": 1, "velocity_mps": [0, 0, 0]}, {"at_s": 9, "velocity_mps": [0, 1, 0]},
-    ]}},
-    "gusts of nothing": {"environment": {"gust": {"at_s": 1, "velocity_mps": [0, 0, 0]}}},
-    "coupling": {"uncertainty": {"inertia_coupling": {"p": 0.25, "q": -0.26, "r": -0.25}}},
-    "sinusoids": {
-        "uncertainty": {"sinusoid": {
-            "p": {"amplitude_rad_s2": 0.02, "frequency_rad_s": 15},
-            "q": {"amplitude_rad_s2": 0.0, "frequency_rad_s": 900},
-            "r": {"amplitude_rad_s2": 0.021, "frequency_rad_s": 15.1},
-        }},
-        "fdi": {"statistical": {}},
-    },
-    "forces": {
-        "fdi": {
-            "fault_class": "all", "statistical": {},
-            "bounds": {"coefficients": {"Cm_q": 0.1, "Cn_r": 0.2}},
-        },
-        "uncertainty": {"mass": 1.05, "coefficients": {"CZ_q": 1.2, "CY_r": 0.79, "CX_0": 3}},
-    },
-    "forces of nothing declared": {
-        "fdi": {"fault_class": "all", "statistical": {}, "bounds": {"coefficients": {}}},
-        "uncertainty": {"mass": 0.9499, "coefficients": {"CZ_q": 1.001}}, "design_model": {"mass": 1.0},
-    },
-    "mass of another": {
-        "fdi": {"fault_class": "all", "statistical": {}}, "uncertainty": {"mass": 0.5},
-        "design_model": {"mass": 0.5},
-    },
-    "Nyquist": {
-        "rate_hz": 20, "reference": {
-            "p": [
-                {"sine": {"amplitude_deg_s": 1, "frequency_hz": 10}},
-                {"square": {"amplitude_deg_s": 1, "frequency_hz": 10.1}},
-                {"chirp": {
-                    "amplitude_deg_s": 1, "start_frequency_hz": 11, "end_frequency_hz": 3, "end_s": 2,
-                }},
-            ],
-            "r": [{"step": {"amplitude_deg_s": 1}}],
-        },
-        "uncertainty": {"sinusoid": {"q": {"amplitude_rad_s2": 0.01, "frequency_rad_s": 62.9}}},
-        "faults": [
-            {"type": "float", "actuator": "flap", "at_s": 1},
-            *(
-                {"type": "oscillatory", "actuator": surface, "at_s": 1, "amplitude_deg": 1,
-                 "frequency_rad_s": of} for surface, of in (("aileron", 62.8), ("rudder", 62.9))
-            ),
-        ],
-    },
-    "airspeed": {"initial": {"airspeed_mps": 55.1}},
-}  # fmt: skip
-
-
 def test_what_is_unwise_is_said_at_the_bound_and_not_before(changed):
-    assert not changed({case: load({"name": "x", **given}).warnings() for case, given in UNWISE.items()})
+    given = yaml.safe_load((Path(__file__).parents[1] / "data" / "unwise.yaml").read_text())
+    assert not changed({case: load({"name": "x", **keys}).warnings() for case, keys in given.items()})

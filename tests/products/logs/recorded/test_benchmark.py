@@ -59,6 +59,11 @@ def test_other_days_have_a_row_each_and_a_worst(folder, monkeypatch, tmp_path, c
     assert "| drawn, not looked at: worst |" in page.read_text()
 
 
+def test_one_thing_changes_a_day(changed):
+    mixer = np.array([[0.5, 0.4], [0.5, -0.6]])
+    assert not changed([vars(day) for day in other_days.one_change_days(mixer, ["roll", "pitch"])])
+
+
 def test_drawn_days_differ_as_they_say():
     """Standard deviations of 600 days; of the absolute of a normal number, its own."""
     drawn = other_days.random_days(2, range(600))

@@ -88,3 +88,7 @@ def test_each_surface_is_found_while_the_airframe_has_changed(seed):
     record = listened(*flown(seed))
     assert [1.0 + theta for theta in record.parameters[:N]] == pytest.approx(1.0 + THETA, abs=0.1)
     assert effectiveness_estimator.effectiveness_of(record, 0) == pytest.approx(0.1, abs=0.1)
+
+
+def test_an_aircraft_of_four_surfaces_has_no_estimator():
+    assert [estimator_dtype(n)["P"].shape for n in (4, 5)] == [(1, 1), (20, 20)]

@@ -5,18 +5,12 @@ import pytest
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.scenario.schema import Scenario
 from flying import SINES
+from given import given
+
+GIVEN = given(__file__)
 
 COEFFICIENTS = {"Cm_alpha": 1.05, "Cm_de": 0.95, "Cl_p": 0.95, "Cl_da": 1.05, "Cn_p": 1.05, "Cm_0": 1.05}
-CONDITIONS = {
-    "tactical": ({"sensors": "tactical-grade"}, {"sensors": "tactical-grade"}),
-    "consumer": ({"sensors": "consumer-grade"}, {"sensors": "consumer-grade"}),
-    "servo": ({"actuators": "servo"}, {}),
-    "slow servo in coarse frames": ({"actuators": {"bandwidth_rad_s": 10}, "rate_hz": 50, "substeps": 4}, {}),
-    "coefficients": ({"uncertainty": {"coefficients": COEFFICIENTS}}, {"coefficients": 0.05}),
-    "inertia": ({"uncertainty": {"inertia": {"Ix": 1.05, "Iy": 0.95, "Iz": 1.05}}}, {"inertia": 0.05}),
-    "air": ({"environment": {"turbulence": "dryden", "severity": "light"}}, {"turbulence": "light"}),
-    "gust": ({"environment": {"gust": {"at_s": 3, "velocity_mps": [0, 4, -6]}, "wind_mps": [9, 3, 1]}}, {}),
-}
+CONDITIONS = GIVEN["conditions"]
 LOSS = {"actuator": "elevator", "type": "loss_of_effectiveness", "magnitude": 0.6, "at_s": 6.0}
 
 

@@ -8,6 +8,9 @@ from beaver_ftc.diagnosis.monitors.numbering import ALPHA_TEST, BETA_TEST, RPM_T
 from beaver_ftc.plant.instruments import AX, SENSORS
 from beaver_ftc.scenario.schema import load
 from flying import SINES
+from given import given
+
+GIVEN = given(__file__)
 
 SWINGING = {
     "p": [{"sine": {"amplitude_deg_s": 4, "frequency_hz": 0.3}}],
@@ -97,26 +100,7 @@ AGAIN = [{"at_s": 1.3, "scheme": "adaptive-estimators"}]
 
 @pytest.mark.parametrize(
     ("sensor", "kind", "magnitude", "at_s", "more"),
-    [
-        ("phi", "bias", -30.0, 0.0, {"rate_hz": 50, "reference": SWINGING}),
-        ("phi", "bias", 3.0, 0.0, {"rate_hz": 20, "control": {"law": "lqr"}}),
-        ("phi", "bias", -4.0, 1.27, {"changes": AGAIN, "reference": SWINGING}),
-        ("theta", "scale", -0.18, 0.0, {}),
-        ("theta", "bias", 6.0, 0.0, {"reference": SWINGING}),
-        ("alpha", "bias", -2.4, 0.0, {"rate_hz": 20}),
-        ("alpha", "scale", 0.6, 0.0, {"reference": SWINGING}),
-        ("beta", "bias", -1.2, 0.0, {"rate_hz": 200, "fdi": ALL}),
-        ("beta", "bias", 8.0, 0.0, {"reference": SWINGING}),
-        ("V", "bias", -8.0, 0.0, {"reference": SWINGING}),
-        ("V", "scale", -0.8, 0.0, {"reference": SWINGING}),
-        ("qdyn", "bias", 170.0, 0.0, {"rate_hz": 20}),
-        ("q", "bias", 0.4, 0.0, {}),
-        ("q", "bias", 3.0, 1.0, {"changes": AGAIN, "rate_hz": 20}),
-        ("p", "scale", -0.65, 1.28, {"changes": AGAIN, "reference": SWINGING}),
-        ("p", "noise", 10.0, 0.0, {}),
-        ("p", "noise", 10.0, 0.5, {"changes": AGAIN}),
-        ("p", "noise", 0.7, 0.0, {"rate_hz": 20}),
-    ],
+    GIVEN["one that is broken as the diagnosis begins"],
 )
 def test_one_that_is_broken_as_the_diagnosis_begins(sensor, kind, magnitude, at_s, more):
     given = {"duration_s": 4, "reference": {}} | more

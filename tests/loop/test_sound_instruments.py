@@ -5,6 +5,9 @@ import pytest
 import beaver_ftc as bf
 from beaver_ftc.scenario.schema import load
 from flying import SINES
+from given import given
+
+GIVEN = given(__file__)
 
 SWINGING = {
     "p": [{"sine": {"amplitude_deg_s": 10, "frequency_hz": 0.5}}],
@@ -37,34 +40,7 @@ def accelerometers(grade, turbulence, fdi, seed, **more):
     return {"reference": SINES, **given, **more}
 
 
-FLOWN = {
-    "slope": {"reference": ROLLED, **has(p={"scale_error": 0.02})},
-    "low rate": {"reference": FAST, "rate_hz": 23, **has(p={"scale_error": -0.02})},
-    "low rate, substeps": {"reference": FAST, "rate_hz": 20, "substeps": 3, **has(r={"scale_error": 0.05})},
-    "bias": {"duration_s": 26, "rate_hz": 30, **has(q={"bias_deg_s": -1.0})},
-    "wind": {"environment": {"wind_mps": [-19, 6, 1]}},
-    "swinging in wind": {"environment": {"wind_mps": [0, 0, -1]}, "reference": SWINGING, "rate_hz": 20},
-    "drift": {"reference": SWINGING, "duration_s": 10, **has(theta={"drift_deg_h": -3600.0})},
-    "dense": {
-        "reference": SWINGING, "duration_s": 6, **has(qdyn={"bias_pa": 150.0}, V={"bias_mps": -4.0})
-    },
-    "a diagnosis that restarts": {
-        "reference": SWINGING, "rate_hz": 50, "duration_s": 6,
-        "changes": [{"at_s": 5.3, "scheme": "adaptive-estimators"}],
-    },
-    "others within the declaration": {
-        "reference": SWINGING, "substeps": 4, "duration_s": 6, "sensors": GRADE,
-        "fdi": {"bounds": {"sensors": GRADE}},
-        "changes": [{"at_s": 2.0, "sensors": "ideal", "declared_sensors": GRADE},
-                    {"at_s": 4.0, "sensors": GRADE, "declared_sensors": GRADE}],
-    },
-    "another grade": {
-        "reference": SWINGING, "rate_hz": 71, "duration_s": 6,
-        "fdi": {"statistical": {}, "fault_class": "all"},
-        "changes": [{"at_s": 2.0, "sensors": GRADE, "declared_sensors": GRADE},
-                    {"at_s": 4.0, "sensors": "ideal", "declared_sensors": "ideal"}],
-    },
-}  # fmt: skip
+FLOWN = GIVEN["flown"]  # fmt: skip
 
 
 def suspected(words):

@@ -9,30 +9,14 @@ import pytest
 
 import beaver_ftc as bf
 from flying import loss
+from given import given
 from streamed import Flown
+
+GIVEN = given(__file__)
 
 PAIR = [loss(at_s=1.0), {"type": "stuck", "actuator": "rudder", "position_deg": 3.0, "at_s": 2.0}]
 NOISY = {"p": {"noise_std_deg_s": 0.06}, "q": {"noise_std_deg_s": 0.05}, "r": {"noise_std_deg_s": 0.04}}
-CASES = {
-    "published": {"faults": [loss(at_s=1.0)]},
-    "unanticipated": {"faults": [{"type": "unanticipated", "at_s": 1.0}], "initial": {"airspeed_mps": 46}},
-    "of every type": {
-        "faults": [{"type": "bias", "actuator": "flap", "bias_deg": 3, "at_s": 1.0}],
-        "fdi": {"fault_class": "all", "sensor_monitor": "never"},
-    },
-    "two at once": {"faults": PAIR, "fdi": {"fault_class": "all", "pairs": True, "sensor_monitor": "never"}},
-    "slow actuators": {
-        "faults": [loss("aileron", at_s=1.0)],
-        "actuators": {"bandwidth_rad_s": 20, "rate_limit_deg_s": 60},
-    },
-    "another model": {"faults": [loss("rudder", at_s=1.0)], "design_model": {"linearised": True}},
-    "in noise and turbulence": {
-        "faults": [loss(at_s=2.0, magnitude=0.8)],
-        "sensors": NOISY,
-        "environment": {"turbulence": "dryden", "severity": "light"},
-        "fdi": {"bounds": {"sensors": NOISY, "turbulence": "light"}, "statistical": {}},
-    },
-}
+CASES = GIVEN["cases"]
 
 
 @pytest.fixture(scope="module", params=CASES)

@@ -18,7 +18,10 @@ from beaver_ftc.cli.main import app
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.plant.adapter import bare
 from beaver_ftc.plant.instrumented import instrument, source_of
+from given import given
 from trainer import TRAINER
+
+GIVEN = given(__file__)
 
 SCENARIO = "name: stranger\naircraft: ./trainer\nduration_s: 0.5\n"
 
@@ -82,44 +85,7 @@ def refused(*asked):
     return said
 
 
-DEEDS = [
-    ("trainer.xml", '<output name="{precious}" type="CSV" rate="1"> <rates> ON </rates> </output>',
-     '<output name="'),
-    ("trainer.xml", '<output name="{precious}" type="TABULAR" rate="1"/>', '<output name="'),
-    ("trainer.xml", '<output name="127.0.0.1" type="SOCKET" port="{tcp}" protocol="TCP"/>',
-     '<output name="127.0.0.1" type="SOCKET"'),
-    ("trainer.xml", '<output name="127.0.0.1" type="SOCKET" port="{udp}" protocol="UDP"/>',
-     '<output name="127.0.0.1" type="SOCKET"'),
-    ("trainer.xml", '<output name="127.0.0.1" type="FLIGHTGEAR" port="{udp}" protocol="UDP"/>',
-     '<output name="127.0.0.1" type="FLIGHTGEAR"'),
-    ("trainer.xml", '<output name="127.0.0.1" type="QTJSBSIM" port="{udp}" rate="20"/>', "<output name="),
-    ("trainer.xml", '<input port="{free}"/>', '<input port="'),
-    ("trainer.xml", '<input port="{free}" type="QTJSBSIM" rate="20"/>', '<input port="'),
-    ("trainer.xml", '<output file="log"/>', '<output file="log"> '),
-    ("trainer.xml", '<child name="other"/>', '<child name="other">'),
-    ("trainer.xml", '<system file="{precious}"/>', "leaves the folder"),
-    ("trainer.xml", '<system file="../other/x"/>', '<system file="../other/x"> leaves the folder'),
-    ("trainer.xml", '<system file="sub\\..\\x"/>', "leaves the folder"),
-    ("trainer.xml", '<propulsion file="/etc/x"/>', '<propulsion file="/etc/x"> leaves the folder'),
-    ("trainer.xml", '<system name="s"> <channel name="c"> <fcs_function name="simulation/write-state-file">'
-     "<function> <value> 1 </value> </function> </fcs_function> </channel> </system>", "write-state-file"),
-    ("Systems/rudder.xml", "<channel name='w'> <pure_gain name='g'> <input> fcs/rudder-cmd-rad </input>"
-     "<gain> 1 </gain> <output> simulation/write-state-<!-- -->file </output> </pure_gain> </channel>",
-     "simulation/write-state-file writes a file"),
-    ("Systems/rudder.xml", "<channel name='l'> <pure_gain name='g'> <input> fcs/rudder-cmd-rad </input>"
-     "<gain> 1 </gain> <output> simulation/do_linearization </output> </pure_gain> </channel>",
-     "simulation/do_linearization writes a file"),
-    ("scripts/fly.xml", '<runscript name="r"> <use aircraft="trainer" initialize="reset"/>'
-     '<run start="0" end="1" dt="0.1"> <event name="e"> <set name="simulation/do_linearization" value="1"/>'
-     "</event> </run> </runscript>", '<set name="simulation/do_linearization" value="1"> writes a file'),
-    ("Systems/rudder.xml", '<system file="/etc/passwd"/>', '<system file="/etc/passwd"> leaves the folder'),
-    ("Systems/rudder.xml", '<output name="{precious}" type="CSV"/>', "<output name="),
-    ("scripts/fly.xml", '<runscript name="r"> <use aircraft="trainer" initialize="reset"/>'
-     '<output name="{precious}" type="CSV" rate="1"/> <run start="0" end="1" dt="0.1"/> </runscript>',
-     "<output name="),
-    ("scripts/fly.xml", '<runscript name="r"> <use aircraft="../x" initialize="/etc/passwd"/> </runscript>',
-     '<use aircraft="../x" initialize="/etc/passwd"> leaves the folder'),
-]  # fmt: skip
+DEEDS = GIVEN["deeds"]  # fmt: skip
 
 
 @needs.service("compare")

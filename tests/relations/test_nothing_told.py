@@ -22,7 +22,10 @@ from beaver_ftc.scenario.truth import Truth
 from beaver_ftc.studies.sensitivity.beyond import Flight, scenario_of
 from beaver_ftc.studies.sensitivity.errors import errors_of
 from flying import SINES
+from given import given
 from test_architecture import modules, tree
+
+GIVEN = given(__file__)
 
 TOLD_NOTHING = ("diagnosis", "control", "design")
 # Names of scenarios and of the truth's sections, as parameters and as types.
@@ -93,36 +96,12 @@ SENSOR_FAULTS = (
     {"sensor": "engine_rpm", "type": "bias", "magnitude": 80},
     {"sensor": "V", "type": "noise", "magnitude": 2},
 )  # fmt: skip
-LATER = {
-    **{f"{fault.get('actuator', fault['type'])} {fault['type']}": {"faults": [fault | {"at_s": LATE}]}
-       for fault in SURFACE_FAULTS},
-    **{f"{fault['sensor']} {fault['type']}": {"faults": [fault | {"at_s": LATE}]} for fault in SENSOR_FAULTS},
-    "gust": {"environment.gust": [{"at_s": LATE, "velocity_mps": [0, 0, 5]}]},
-    "law": {"changes": [{"at_s": LATE, "law": "nominal"}]},
-    "sensors": {"changes": [{"at_s": LATE, "sensors": {"q": {"bias_deg_s": 1}}}]},
-    "longer": {"duration_s": 2.0},
-    "expected": {"expect": {"stays_in_envelope": True}},
-}  # fmt: skip
+LATER = GIVEN["later"]  # fmt: skip
 NOISY = {
     "sensors": "tactical-grade", "environment": {"turbulence": "dryden", "severity": "light"},
     "fdi.bounds.sensors": "tactical-grade", "fdi.bounds.turbulence": "light",
 }  # fmt: skip
-DECLARED = {
-    "published": {},
-    "all": {"fdi.fault_class": "all", "fdi.statistical": {}},
-    "all, sound": {"fdi.fault_class": "all", "fdi.statistical": {}, "fdi.sensor_monitor": "never"},
-    "all, noisy": {"fdi.fault_class": "all", "fdi.statistical": {}, **NOISY},
-    "statistical, noisy": {"fdi.statistical": {}, **NOISY, "substeps": 2},
-    "rival": {"fdi.scheme": "multiple-models", "control.law": "lqr", **NOISY},
-    "oracle": {"control.law": "oracle", "autopilot": {"altitude_m": [{"hold": True}]}},
-    "split": {"aircraft": "beaver-split", "fdi.fault_class": "all"},
-    "pairs": {"fdi.fault_class": "all", "fdi.pairs": True, "fdi.sensor_monitor": "always"},
-    "paper": {"fdi.scheme": "zhang2005", "control.law": "zhang2005"},
-    "servos": {
-        "design_model.linearised": True, "actuators": "servo", "control.law": "adaptive",
-        "fdi.bounds.actuators": {"bandwidth": 0.2, "elevator": {"dead_band_deg": 0.1}},
-    },
-}  # fmt: skip
+DECLARED = GIVEN["declared"]  # fmt: skip
 
 
 def declared(name):
@@ -166,17 +145,7 @@ def test_an_instrument_that_breaks_by_nothing_shows_nothing(sensor):
     assert bf.fly(declared("published").with_({"faults": [broken]})).log.equals(log_of("published"))
 
 
-TRUTHS = {
-    "surface": {"faults": [{"actuator": "aileron", "type": "hardover", "direction": 1, "at_s": 0.2}]},
-    "sensor": {"faults": [{"sensor": "altitude", "type": "freeze", "at_s": 0.0}]},
-    "seed": {"seed": 987654321},
-    "air": {"environment": {"turbulence": "dryden", "severity": "severe", "wind_mps": [9, -4, 1]}},
-    "sensors": {"sensors": "consumer-grade"},
-    "actuators": {"actuators": {"bandwidth_rad_s": 9, "travel_deg": [-5, 20]}},
-    "servos": {"uncertainty": {"actuators": {"bandwidth": 0.7, "rudder": {"dead_band_deg": 0.2}}}},
-    "mass": {"uncertainty": {"mass": 1.05, "inertia": {"Iy": 1.1}, "cg_m": [0.05, 0, 0]}},
-    "coefficients": {"uncertainty": {"coefficients": {"Cm_alpha": 1.1, "Cl_p": 0.8}}},
-}  # fmt: skip
+TRUTHS = GIVEN["truths"]  # fmt: skip
 OF_THE_COMMAND = {
     "prediction.u", "prediction.u_lo", "prediction.u_hi", "prediction.commanded",
     "control.layout.trim", "control.allocation.output.command",

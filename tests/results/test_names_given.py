@@ -5,7 +5,10 @@ import pytest
 import beaver_ftc as bf
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.scenario.schema import Scenario as Given
+from given import given
 from trainer import TRAINER
+
+GIVEN = given(__file__)
 
 LOSS = {"actuator": "elevator", "type": "loss_of_effectiveness", "magnitude": 0.5, "at_s": 4}
 JAM = {"actuator": "rudder", "type": "stuck", "position_deg": 8, "at_s": 9}
@@ -15,19 +18,7 @@ NOISY = {"bounds": {"sensors": "tactical-grade"}}
 
 @pytest.mark.parametrize(
     "keys",
-    [
-        {"fdi": {}},
-        {"fdi": ALL},
-        {"fdi": ALL | {"bounds": {"sensors": {"q": {"bias_deg_s": 0.1}}}}},
-        {"fdi": NOISY},
-        {"fdi": ALL | {"bounds": {"sensors": {"q": {"scale_error": 0.01}}}}},
-        {"fdi": {"scheme": "zhang2005"}},
-        {"fdi": ALL, "changes": [{"at_s": 3, "declared_sensors": "tactical-grade"}]},
-        {"fdi": ALL, "changes": [{"at_s": 3, "law": "nominal"}]},
-        {"fdi": ALL | {"statistical": {}}},
-        {"fdi": ALL, "aircraft": "beaver-split", "faults": [LOSS | {"actuator": "aileron_left"}, JAM]},
-        {"fdi": ALL, "aircraft": "./trainer"},
-    ],
+    GIVEN["what a hint proposes can be flown"],
 )
 def test_what_a_hint_proposes_can_be_flown(keys):
     given = {"name": "x", "duration_s": 10, "faults": [LOSS, JAM], **keys}

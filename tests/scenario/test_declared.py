@@ -6,6 +6,9 @@ import pytest
 from beaver_ftc.scenario.pairs import failing, of_several
 from beaver_ftc.scenario.schema import load
 from flying import declared_in
+from given import given
+
+GIVEN = given(__file__)
 
 
 def test_errors_of_an_instrument_in_si_and_how_far_a_reading_can_be_off():
@@ -39,12 +42,7 @@ def of_two(*spans, **keys):
 
 @pytest.mark.parametrize(
     ("spans", "at_once"),
-    [
-        ([("flap", 5, None)], False), ([("flap", 5, None), ("flap", 6, None)], False),
-        ([("flap", 5, 6), ("rudder", 6, 7)], False), ([("flap", 5, 6.1), ("rudder", 6, 7)], True),
-        ([("flap", 5, None), ("rudder", 19.9, None)], True), ([("rudder", 9, 12), ("flap", 5, 9.5)], True),
-        ([("rudder", 9, 12), ("flap", 5, 9)], False),
-    ],
+    GIVEN["surfaces fail at once where their faults overlap"],
 )  # fmt: skip
 def test_surfaces_fail_at_once_where_their_faults_overlap(spans, at_once):
     assert of_several(of_two(*spans)) == (

@@ -7,6 +7,9 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.scenario import interventions as done
 from beaver_ftc.scenario.interventions import StickTrack
 from beaver_ftc.scenario.schema import load
+from given import given
+
+GIVEN = given(__file__)
 
 LOSS = {"type": "loss_of_effectiveness", "actuator": "elevator", "magnitude": 0.4}
 STUCK = {"type": "stuck", "actuator": "rudder", "position_deg": 3}
@@ -56,21 +59,13 @@ def moved(*rates):
 
 @pytest.mark.parametrize(
     ("rates", "is_moved", "tables"),
-    [
-        ([], False, []),
-        ([None, (0, 0, 0), None], False, []),
-        ([(1, 0, 0)], True, [("p", [0.0], [1.0])]),
-        ([None, None, (0, 2, 0), (0, 2, 0), None],
-         True, [("q", [0.0, 0.1, 0.2, 0.3, 0.4], [0.0, 0.0, 2.0, 2.0, 0.0])]),
-        ([(1, 0, -1), (1, 0, 3), None],
-         True, [("p", [0.0, 0.1, 0.2], [1.0, 1.0, 0.0]), ("r", [0.0, 0.1, 0.2], [-1.0, 3.0, 0.0])]),
-    ],
+    GIVEN["a table of the stick gives every frame its rate"],
 )  # fmt: skip
 def test_a_table_of_the_stick_gives_every_frame_its_rate(rates, is_moved, tables):
     track = moved(*rates)
     assert track.moved is is_moved
     found = list(track.tables(10.0))
-    assert [(axis, pytest.approx(times), of) for axis, times, of in found] == tables
+    assert [[axis, pytest.approx(times), of] for axis, times, of in found] == tables
     for axis, times, of in found:
         felt = [0.0 if rate is None else rate["pqr".index(axis)] for rate in rates]
         assert list(np.interp(np.arange(len(rates)) / 10.0, times, of)) == felt

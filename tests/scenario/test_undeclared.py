@@ -3,6 +3,9 @@
 import pytest
 
 from beaver_ftc.scenario.schema import Scenario, load_text
+from given import given
+
+GIVEN = given(__file__)
 
 TOLD = """
 fdi: {bounds: {sensors: tactical-grade, turbulence: light, coefficients: {Cm_alpha: 0.05}, inertia: 0.05}}
@@ -57,48 +60,7 @@ GUST = {"at_s": 1, "velocity_mps": [0, 0, 5]}
 
 @pytest.mark.parametrize(
     ("keys", "says"),
-    [
-        (
-            {"uncertainty": {"inertia_coupling": {"p": -0.3}}},
-            ["uncertainty.inertia_coupling.p: -0.3 is beyond"],
-        ),
-        ({"uncertainty": {"sinusoid": SINUSOID}}, ["uncertainty.sinusoid.q: 0.03 rad/s2 is beyond"]),
-        (
-            {"uncertainty": {"sinusoid": SINUSOID}, "fdi": {"statistical": {}}},
-            ["uncertainty.sinusoid.q: 0.03 rad/s2 is", "uncertainty.sinusoid.q: 20 rad/s is faster than"],
-        ),
-        ({"environment": {"gust": GUST}}, ["environment.gust: what a gust does"]),
-        (
-            {"environment": {"gust": GUST}, "fdi": {"statistical": {}, "bounds": {"turbulence": "light"}}},
-            ["environment.gust: what a gust does", "environment.gust: JSBSim's does not rotate"],
-        ),
-        (
-            {
-                "environment": {"turbulence": "dryden", "severity": "light"},
-                "initial": {"altitude_m": 500},
-                "fdi": {"bounds": {"turbulence": "light"}},
-            },
-            [],
-        ),
-        (
-            {"environment": {"wind_mps": [3, -2, 1.5]}, "fdi": {"sensor_monitor": "always"}},
-            ["environment: vertical wind of 1.5 m/s is more than fdi.bounds.vertical_wind_mps, 1:"],
-        ),
-        (
-            {
-                "environment": {"wind_mps": [3, -2, -1.5]},
-                "fdi": {"sensor_monitor": "always", "bounds": {"vertical_wind_mps": 1.6}},
-            },
-            [],
-        ),
-        (
-            {
-                "environment": {"wind_mps": [0, 0, 0.7], "gust": {**GUST, "velocity_mps": [1, 2, 0.4]}},
-                "fdi": {"sensor_monitor": "always"},
-            },
-            ["environment.gust: what a gust does", "environment: vertical wind of 1.1 m/s is more than"],
-        ),
-    ],
+    GIVEN["all that is undeclared is said where there is a diagnosis"],
 )
 def test_all_that_is_undeclared_is_said_where_there_is_a_diagnosis(keys, says):
     said = Scenario.model_validate({"name": "x", **keys}).warnings()

@@ -6,25 +6,12 @@ from math import degrees
 import pytest
 
 import beaver_ftc as bf
+from given import given
+
+GIVEN = given(__file__)
 
 SURFACES = {"aileron": "p", "elevator": "q", "rudder": "r", "flap": None}
-FAULTS = {
-    "loss": {"type": "loss_of_effectiveness", "magnitude": 0.4},
-    "growing loss": {
-        "type": "loss_of_effectiveness", "magnitude": 0.8, "profile": "incipient", "kappa_per_s": 0.3,
-    },
-    "stuck": {"type": "stuck"},
-    "float": {"type": "float"},
-    "hardover up": {"type": "hardover", "direction": 1},
-    "hardover down": {"type": "hardover", "direction": -1},
-    "bias up": {"type": "bias", "bias_deg": 1.5},
-    "bias down": {"type": "bias", "bias_deg": -1.5},
-    "growing bias": {"type": "bias", "bias_deg": -1.5, "profile": "incipient", "kappa_per_s": 0.5},
-    "slow": {"type": "rate_limit", "scale": 0.02},
-    "swing": {"type": "oscillatory", "amplitude_deg": 1.5, "frequency_rad_s": 6.0},
-    "small swing": {"type": "oscillatory", "amplitude_deg": 0.4, "frequency_rad_s": 1.5},
-    "quick swing": {"type": "oscillatory", "amplitude_deg": 1.5, "frequency_rad_s": 40.0},
-}  # fmt: skip
+FAULTS = GIVEN["faults"]  # fmt: skip
 # Beyond what the surface can do: for good, or now and then.
 ORDERS = {
     "one stop": [{"step": {"amplitude_deg_s": 25, "start_s": 0.5}}],

@@ -9,17 +9,14 @@ from beaver_ftc_logs.findings import (
     verdict_document,
 )
 from beaver_ftc_logs.regression import innovations
+from given import given
 from products.logs import small
+
+GIVEN = given(__file__)
 
 NAMES = ["right", "left"]
 SOUND, HALF, LESS = ("", [1.0, 1.0]), ("left", [1.0, 0.5]), ("left", [1.0, 0.4])
-PARTS = {
-    "two in turn": [(8, *HALF), (9, *LESS), (7, "right", [0.2, 1.0])],
-    "a brief level within": [(10, *HALF), (3, *LESS), (10, *HALF), (5, *SOUND)],
-    "just brief, just not": [(10, *HALF), (6, *LESS), (10, *HALF), (7, *LESS)],
-    "brief before one that lasts": [(4, *LESS), (9, *SOUND), (9, *HALF)],
-    "both": [(4, *SOUND), (9, "right+left", [0.3, 0.6]), (3, *SOUND)],
-}
+PARTS = GIVEN["parts"]
 
 
 @pytest.mark.parametrize("name", PARTS)

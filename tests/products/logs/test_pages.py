@@ -6,8 +6,11 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs import pages
 from beaver_ftc_logs.findings import verdict_document
 from beaver_ftc_logs.identification_page import PAGE_MARK, refuse_foreign_file, render_identification
+from given import given
 from kept import page
 from products.logs import small
+
+GIVEN = given(__file__)
 
 MODEL = small.model(settings={"alarm": 0.9})
 SOUND, HALF = ("", [1.0, 1.0]), ("left", [1.0, 0.5])
@@ -58,25 +61,7 @@ def test_only_a_page_of_ours_is_written_over(tmp_path):
         refuse_foreign_file(tmp_path)
 
 
-IDENTIFIED = {
-    "flights": [{"name": "one", "samples": 250, "of": 300, "notes": []}],
-    "tests": [
-        {
-            "left_out": "second half", "samples": 120, "explained": {"p": 0.91, "q": 0.92, "r": 0.93},
-            "residual_rad_s": {"p": 0.011, "q": 0.012, "r": 0.013},
-            "score": {"classes": 0.9871, "mean_error": 0.0123},
-        },
-        {"left_out": "first half", "samples": 0},
-    ],
-    "collinear": [{"regressor": "p[-1]", "inflation": 23.4}],
-    "colour": {"p": 1.1, "q": 1.2, "r": 1.3},
-    "spectrum": [{"from_hz": 0.0, "to_hz": 0.1, "p": 0.9, "q": 1.0, "r": 1.1}],
-    "output_error": {
-        "windows": 40, "servo_lag_s": 0.12, "servo_lag_sd_s": 0.01, "delay_s": 0.05, "delay_sd_s": 0.02,
-        "shorter_than_can_be_told": False,
-        "explained_of_windows_not_fitted": {"p": 0.81, "q": 0.82, "r": 0.83},
-    },
-}  # fmt: skip
+IDENTIFIED = GIVEN["identified"]  # fmt: skip
 
 
 def test_the_page_of_an_identification(changed, monkeypatch):

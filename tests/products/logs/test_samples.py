@@ -7,8 +7,11 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs import samples as of
 from beaver_ftc_logs.loading import load_flights_for_fit
 from beaver_ftc_logs.recording import Column, LoggedFailure, RecordedFlight
+from given import given
 from products.logs import small
 from products.logs.test_signals import T_S, turning, yawed
+
+GIVEN = given(__file__)
 
 WING = small.vehicle()
 
@@ -100,28 +103,7 @@ IN_SI = {  # column: what its number is multiplied by, and what is added
     "acc": (-9.80665, 9.80665 * 0.3), "wind": (0.44704, 0.0), "alpha": (-DEG, 0.0), "extra": (2.0, 7.0),
     "left_left": (1.0, 0.0), "other": (1.0, 0.0), "out": (1.0, 0.0),
 }  # fmt: skip
-EVERYWHERE = {
-    "rates": {
-        "p": {"column": "gx", "unit": "deg/s", "scale": 0.1, "offset": -2.0},
-        "q": {"column": "gy", "unit": "cdeg/s"}, "r": "gz",
-    },
-    "commands": [{"column": "pwm", "scale": 0.0025, "offset": -3.75}, {"column": "share", "unit": "%"}],
-    "surfaces": {"right": {"pwm": 0.5, "share": 0.4}, "left": {"pwm": 0.3, "share": -0.2}},
-    "signals": [{"column": "wind", "unit": "mph"}],
-    "labels": {"left": {"column": "left_left", "scale": 0.01}},
-    "outputs": {"left": {"column": "out", "scale": 3.0}},
-    "attitude": {
-        "roll": {"column": "phi", "unit": "deg"}, "pitch": {"column": "theta", "unit": "mrad"},
-        "yaw": {"column": "psi", "unit": "cdeg"},
-    },
-    "acceleration": {"column": "acc", "unit": "g", "scale": -1.0, "offset": 0.3},
-    "airspeed": {"column": "tas", "unit": "kt"},
-    "energy": {"altitude": {"column": "alt", "unit": "ft"}, "airspeed": {"column": "tas", "unit": "kt"}},
-    "flow": {
-        "alpha_rad": {"column": "alpha", "unit": "deg", "scale": -1.0},
-        "dpt": {"column": "extra", "scale": 2.0, "offset": 7.0},
-    },
-}  # fmt: skip
+EVERYWHERE = GIVEN["everywhere"]  # fmt: skip
 
 
 def test_every_column_that_a_vehicle_names_is_in_si_but_labels_and_outputs():

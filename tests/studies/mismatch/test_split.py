@@ -14,6 +14,9 @@ from beaver_ftc.studies.mismatch.sources import SOURCES, name_of
 from beaver_ftc.studies.mismatch.split import split_flight
 from beaver_ftc.studies.mismatch.variants import variant_of
 from flying import flown, loss, scenario
+from given import given
+
+GIVEN = given(__file__)
 
 PUBLISHED_BOUND = 0.02  # rad/s2
 ROUNDING = 5e-8  # rad/s2: what unit conversions and rounding of the aircraft's XML may leave
@@ -52,23 +55,7 @@ def test_with_nothing_declared_truth_and_design_differ_by_the_earth_alone(initia
     assert all(largest(found.contributions[name]) == 0.0 for name in others)
 
 
-DECLARED = {
-    "coefficients": {
-        "uncertainty": {"coefficients": {"Cm_alpha": 1.1, "Cl_p": 0.9, "Cn_dpt3": 1.5, "CZ_alpha": 1.05}}
-    },
-    "engine": {"design_model": {"engine_terms": False}},
-    "simplification": {"design_model": {"linearised": True, "frozen_alpha": True}},
-    "inertia": {
-        "design_model": {"mass": 1.1, "inertia": {"Ix": 0.8, "Jxz": 3.0}},
-        "uncertainty": {"mass": 1.2, "inertia": {"Ix": 1.1, "Iz": 0.9}, "cg_m": [0.05, 0.02, -0.03]},
-    },
-    "wind_turbulence": {"environment": {"turbulence": "dryden", "severity": "moderate"}},
-    "inertia_coupling": {"uncertainty": {"inertia_coupling": {"p": 0.2, "q": -0.2, "r": 0.2}}},
-    "sinusoids": {"uncertainty": {"sinusoid": {"q": {"amplitude_rad_s2": 0.02, "frequency_rad_s": 15}}}},
-    "actuators": {"actuators": "servo"},
-    "sensors": {"sensors": "tactical-grade"},
-    "fault": {"faults": [loss(at_s=4)]},
-}
+DECLARED = GIVEN["declared"]
 
 
 @pytest.mark.parametrize(("source", "keys"), DECLARED.items())
@@ -93,25 +80,7 @@ def test_a_coarse_frame_means_the_mismatch_over_its_jsbsim_frames():
     assert largest(found.named["unexplained"]) <= ROUNDING
 
 
-FAULTS = {
-    "jam, repaired": [{"type": "stuck", "actuator": "elevator", "at_s": 3, "end_s": 5}],
-    "runaway": [{"type": "hardover", "actuator": "aileron", "at_s": 3, "end_s": 3.4}],
-    "float and incipient loss": [
-        {"type": "float", "actuator": "rudder", "at_s": 3},
-        loss("aileron", 0.5, 4.0, profile="incipient", kappa_per_s=0.5),
-    ],
-    "all on the elevator": [
-        {"type": "bias", "actuator": "elevator", "bias_deg": 2, "at_s": 3},
-        {"type": "oscillatory", "actuator": "elevator", "amplitude_deg": 1, "frequency_rad_s": 6, "at_s": 4},
-        loss(magnitude=0.3, at_s=3.5),
-        loss(magnitude=0.2, at_s=5),
-    ],
-    "twice": [{"type": "unanticipated", "Cm_alpha3": 5, "at_s": 4}] * 2,
-    "slow actuator, and the unanticipated growing": [
-        {"type": "rate_limit", "actuator": "elevator", "scale": 0.005, "at_s": 3},
-        {"type": "unanticipated", "Cm_alpha3": 5, "at_s": 4, "profile": "incipient", "kappa_per_s": 1},
-    ],
-}
+FAULTS = GIVEN["faults"]
 
 
 @pytest.mark.parametrize("actuators", ["ideal", "servo"])

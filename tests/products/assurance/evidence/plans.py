@@ -2,27 +2,17 @@
 
 import random
 
+from given import given
+
+GIVEN = given(__file__)
+
 SHORT = {"duration_s": 1.5, "rate_hz": 50, "fdi": {"fault_class": "all"}}
 LOSS = {"actuator": "elevator", "type": "loss_of_effectiveness", "at_s": 0.5}
 HEALTHY = {**SHORT, "reference": {"q": [{"sine": {"amplitude_deg_s": 6, "frequency_hz": 1}}]}}
 FAULTY = {**HEALTHY, "faults": [{**LOSS, "magnitude": 0.8}]}
 
 # Of each kind: what is required, a flight that meets it, and what is changed of one that does not.
-KINDS = [
-    ({"expect": {"detected_within_s": 0.3}}, FAULTY, {"faults": [{**LOSS, "magnitude": 0.02}]}),
-    ({"expect": {"no_false_alarm": True}}, HEALTHY,
-     {"uncertainty": {"sinusoid": {"q": {"amplitude_rad_s2": 2}}}}),
-    ({"expect": {"no_departure": True, "stays_in_envelope": True}}, HEALTHY,
-     {"initial": {"airspeed_mps": 60}}),
-    ({"expect": {"pre_fault_rms_deg_s": {"q": 2}}}, FAULTY,
-     {"uncertainty": {"coefficients": {"Cm_de": 0.5}}, "control": {"law": "nominal"}}),
-    ({"formula": "always(abs(altitude_m - 1830) <= 60)"}, HEALTHY, {"initial": {"altitude_m": 1600}}),
-    ({"formula": "always[0.5:1.4](eventually[0:0.1](detected >= 0.5))"}, FAULTY, {"faults": []}),
-    ({"formula": "(detected < 0.5) until (abs(elevator_effective_rad) >= 0)"}, HEALTHY, None),
-    ({"bar": {"type": "sweep", "detection_rate": {"at_least": 1}}}, FAULTY, 0.02),
-    ({"bar": {"type": "handling_qualities", "level": 1}}, HEALTHY,
-     {"uncertainty": {"coefficients": {"Cl_beta": -0.5}}}),
-]  # fmt: skip
+KINDS = GIVEN["kinds"]  # fmt: skip
 FLIGHTS = 3  # of a requirement
 
 

@@ -8,6 +8,9 @@ import beaver_ftc as bf
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.scenario.builtin import builtin_plans
 from beaver_ftc_assurance.evidence.plan import load_plan
+from given import given
+
+GIVEN = given(__file__)
 
 GOOD = """\
 name: mine
@@ -55,33 +58,7 @@ def test_a_plan_names_its_own_flights_built_in_ones_and_files_beside_it(write):
     assert plan.expect["A"].no_departure is True
 
 
-MISTAKES = {
-    "unknown": ("id: A,", "idd: A,", "8: requirements[0].idd: unknown key, did you mean id?"),
-    "no-id": ("id: A, ", "", "8: requirements[0].id: required key is missing"),
-    "twice": ("id: B", "id: A", "9: requirements[1].id: A is there twice, allowed: each id once"),
-    "nothing": (", expect: {no_departure: true}", "", "8: requirements[0]: has nothing that can be judged"),
-    "two-kinds": ("bar: {", "formula: q_rad_s <= 1, bar: {", "10: requirements[2]: has formula and bar"),
-    "expect": ("no_departure", "no_departur", "8: requirements[0].expect.no_departur: unknown key, did yo"),
-    "no-fault": ("no_departure: true", "detected_within_s: 1", "8: requirements[0].expect.detected_within"),
-    "name": ("[own, many,", "[own, manny,", "8: requirements[0].over[1]: 'manny' is no flight of the plan"),
-    "outside": ("deeper/also", "../also", "9: requirements[1].over[1]: '../also.yaml' is outside, allowed"),
-    "absolute": ("deeper/also", "/etc/also", "9: requirements[1].over[1]: '/etc/also.yaml' is outside"),
-    "absent": ("deeper/also", "deeper/alzo", "9: requirements[1].over[1]: no such file: 'deeper/alzo.yaml'"),
-    "formula": ("<= 1)", "<= )", "9: requirements[1].formula: ')' where a column, a number or ( is due"),
-    "column": ("q_rad_s", "q_rad", "9: requirements[1].formula: 'q_rad' is no column of many's log, did y"),
-    "ahead": ("always(", "always[0:3.5](", "9: requirements[1].formula: looks 3.5 s ahead, allowed over d"),
-    "bar": ("type: margins", "type: margin", "10: requirements[2].bar.type: 'margin' is not known, did yo"),
-    "bar-key": ("type: margins", "type: margins, gain: 6", "10: requirements[2].bar.gain: unknown key, di"),
-    "of-sweep": ("type: margins", "type: sweep, pass_rate: {at_least: 1}", "10: requirements[2].over[0]:"),
-    "level": ("type: margins", "type: handling_qualities, level: 4", "10: requirements[2].bar.level: 4 is"),
-    "own": ("duration_s: 2", "duration: 2", "3: flights.own.duration: unknown key, did you mean duration_s?"),
-    "sweep": ("position_deg\"", "position\"", "6: flights.many.vary.faults[0].position: "),
-    "named-twice": (
-        "own", "also",
-        "7: requirements: deeper/also.yaml and also are both named also, allowed: each name once",
-    ),
-    "unused": ("[own, many, elevator-stuck]", "[elevator-stuck]", "4: flights.many: no requirement is ove"),
-}  # fmt: skip
+MISTAKES = GIVEN["mistakes"]  # fmt: skip
 
 
 @pytest.mark.parametrize("mistake", MISTAKES)

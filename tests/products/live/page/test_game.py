@@ -5,6 +5,9 @@ import pytest
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_live.page.game import EARLIEST_S, LATEST_S, NOTHING, OVER, Game, hidden_faults
+from given import given
+
+GIVEN = given(__file__)
 
 NAMES = ("aileron", "elevator", NOTHING)
 FAULT = {"type": "stuck", "actuator": "elevator"}
@@ -26,16 +29,7 @@ def a_round(yours, its):
 
 @pytest.mark.parametrize(
     ("yours", "its", "winner"),
-    [
-        (("elevator", 11.0), ("elevator", 12.0), "you"),
-        (("elevator", 13.0), ("elevator", 12.0), "detector"),
-        (("aileron", 11.0), ("elevator", 12.0), "detector"),
-        (("elevator", 13.0), ("aileron", 12.0), "you"),
-        (("aileron", 11.0), ("unanticipated", 12.0), None),
-        (("elevator", 11.0), None, "you"),
-        (("elevator", 9.0), ("elevator", 12.0), "detector"),
-        ((NOTHING, 11.0), None, None),
-    ],
+    GIVEN["the first right answer wins"],
 )
 def test_the_first_right_answer_wins(yours, its, winner):
     game = a_round(yours, its)

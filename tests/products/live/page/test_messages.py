@@ -6,17 +6,12 @@ import pytest
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_live.page import messages
+from given import given
+
+GIVEN = given(__file__)
 
 # Of each number the least and the largest that is taken, and the field that has it.
-LIMITS = [
-    ({"do": "break", "fault": {"magnitude": 0.0}}, ("fault", "magnitude"), -1000, 1000),
-    ({"do": "blow", "velocity_mps": [0.0, 0.0, 0.0]}, ("velocity_mps", 2), -25, 25),
-    ({"do": "aim", "altitude_m": 0.0}, ("altitude_m",), -10_000, 10_000),
-    ({"do": "aim", "airspeed_mps": 0.0}, ("airspeed_mps",), -1000, 1000),
-    ({"do": "stick", "rates_deg_s": [0.0, 0.0, 0.0]}, ("rates_deg_s", 1), -20, 20),
-    ({"do": "speed", "times": 1.0}, ("times",), 1, 20),
-    ({"do": "save", "n": 0}, ("n",), 0, 2**53),
-]
+LIMITS = GIVEN["limits"]
 
 
 @pytest.mark.parametrize(("request_", "place", "least", "most"), LIMITS)

@@ -25,75 +25,15 @@ from beaver_ftc_assurance.certificates.certified import as_text, with_digest
 from beaver_ftc_assurance.certificates.check_certificate import Refused, check_statement_form, failures
 from beaver_ftc_assurance.separation import certified
 from flying import SINES
+from given import given
 from samples import samples
 
 CHECKER = Path(__file__).parents[4] / "tools/check_certificate.py"
-GYRO = {"noise_std_deg_s": 0.02, "bias_deg_s": 0.05, "scale_error": 1e-3}
-GYROS = {"p": GYRO, "q": GYRO, "r": GYRO}
-COARSE = dict.fromkeys("pqr", GYRO | {"quantum_deg_s": 0.02})
 LOSS = {"type": "loss_of_effectiveness", "actuator": "elevator", "magnitude": 0.5, "at_s": 0.5}
-STUCK = {"type": "stuck", "actuator": "aileron", "position_deg": 5, "at_s": 0.5}
-SOUND = {"fault_class": "all", "sensor_monitor": "never"}
-DOUBTED = {"sensor_monitor": "always"}
 
 
-def chance(surface, **bounds):
-    """A flight whose verdict is that of the statistical test."""
-    fdi = {"statistical": {}, "authority": "statistical", "bounds": {"sensors": GYROS, **bounds}}
-    fault = LOSS | {"actuator": surface, "magnitude": 0.9, "at_s": 1.0}
-    return {"faults": [fault], "sensors": GYROS, "fdi": fdi}
-
-
-FLIGHTS = {
-    "loss": {"faults": [LOSS]},
-    "loss with release": {"faults": [LOSS | {"end_s": 0.8}]},
-    "loss, slow filters": {
-        "faults": [LOSS],
-        "fdi": {"sharpen": {"pole_bank": False}},
-    },
-    "loss, as published": {
-        "faults": [LOSS],
-        "fdi": {"thresholds": "published", "sharpen": "none"},
-    },
-    "abrupt loss": {"faults": [LOSS | {"magnitude": 0.1}], "fdi": {"fault_profile": "abrupt"}},
-    "substeps": {"faults": [STUCK], "substeps": 3, "rate_hz": 50, "fdi": SOUND},
-    "any type": {"faults": [STUCK], "fdi": SOUND},
-    "any type with release": {"faults": [STUCK | {"end_s": 0.9}], "fdi": SOUND},
-    "gyros": {"faults": [LOSS], "sensors": COARSE, "fdi": {"bounds": {"sensors": COARSE}}},
-    "filters begun long ago": {  # what a fault can have done to them before the frames kept counts
-        "faults": [LOSS | {"actuator": "rudder", "magnitude": 0.6, "at_s": 1.0}],
-        "sensors": GYROS,
-        "fdi": {"bounds": {"sensors": GYROS}},
-    },
-    "tolerances": {
-        "faults": [STUCK],
-        "fdi": SOUND | {"bounds": {"coefficients": 0.05, "inertia": 0.02}},
-    },
-    "another aircraft": {
-        "aircraft": "jsbsim:c172p",
-        "initial": {"airspeed_mps": 50},
-        "faults": [LOSS],
-    },
-    "chance": chance("rudder", coefficients=0.03),
-    "chance, a step": chance("aileron", coefficients=0.03),
-    "chance, in moving air": chance("aileron", turbulence="light")
-    | {"environment": {"turbulence": "dryden", "severity": "light"}},
-    "an altimeter": {
-        "faults": [{"sensor": "altitude", "type": "bias", "magnitude": 3, "at_s": 1.0}],
-        "fdi": DOUBTED,
-    },
-    "a roll angle": {
-        "faults": [{"sensor": "phi", "type": "bias", "magnitude": 0.1, "at_s": 1.0}],
-        "fdi": DOUBTED,
-    },
-    "blocks": {
-        "faults": [STUCK],
-        "sensors": GYROS,
-        "fdi": SOUND | {"bounds": {"sensors": GYROS}},
-    },
-    "no vane": {"faults": [{"sensor": "alpha", "type": "lost", "at_s": 1.0}], "fdi": DOUBTED},
-    "no fault": {},
-}
+GIVEN = given(__file__)
+FLIGHTS = GIVEN["flights"]
 CHANCE = [name for name in FLIGHTS if name.startswith("chance")]
 
 
@@ -227,9 +167,6 @@ def test_whatever_number_is_altered_the_checker_refuses_it(name):
         assert refusals(name, with_digest(other)), known[i]
 
 
-EARLY = 30  # a row before any fault
-
-
 def single_frame(k, log, **more):
     """A term of one frame, as the log has it."""
     of = {"x": "measured_rad_s", "F": "design_rad_s2", "eta_bar": "eta_bar_rad_s2"}
@@ -237,102 +174,14 @@ def single_frame(k, log, **more):
     return {"weight": 1.0, "d": [0.0, 1.0, 0.0], "first": k, "frame": k, **copies, **more}
 
 
-def times(factor):
-    """Changes a number by a factor."""
-    return lambda value, log: factor * value
-
-
-def frame(k, **more):
-    """Puts the frame k in the place of a sum's terms."""
-    return lambda value, log: [single_frame(k, log, **more)]
-
-
-GYRO_Q = "the declared error of gyro q is not that of the scenario"
-NO_ORDER = "the frames of a term are not in order"
-WHERE_SHOWN = {"theta": "constant while it shows"}
-# Of a document, or of a statement in it, what is another, by key; why it is refused, "" if it is not.
-REFUSED = [
-    ("gyros", "document", {"dt_s": times(1 + 1e-6)}, "dt_s is not the frame of the scenario"),
-    ("gyros", "document", {"instants": times(2)}, "instants: not those of the scenario"),
-    ("gyros", "document", {"omega_E": times(1 + 1e-6)}, "omega_E is not the Earth's rate"),
-    ("gyros", "document", {"declared.o.q": times(0.99)}, GYRO_Q),
-    ("gyros", "document", {"declared.B.q": times(1.01)}, GYRO_Q),
-    ("gyros", "document", {"declared.m.q": times(0.99)}, GYRO_Q),
-    ("gyros", "document", {"declared.g.q": times(0.99)}, "g on q is not allowed"),
-    ("loss", "document", {"declared.b": {}}, "b on p is smaller than the scenario's bound"),
-    ("any type", "aileron hardover up", {"pace_rad_s": times(1 + 1e-9)}, "pace_rad_s is not half the rate"),
-    ("any type", "aileron hardover up", {"stops.0": times(1 - 1e-9)}, "the stop is not that of the log"),
-    ("any type", "aileron bias", {"stops.1": times(1.01)}, "stops"),
-    ("any type", "aileron bias that grows", {"stops.0": times(1.01)}, "stops"),
-    ("any type", "aileron rate_limit", {"ordered": [0.0]}, "ordered: frames are missing"),
-    ("any type", "aileron rate_limit", {"near": times(-1)}, "near is nearer than the order itself"),
-    ("any type", "aileron rate_limit", {"near": 5.0}, "0.0844909 is not more than 5"),
-    ("loss", "rudder", {"least": -1.1}, "least is not the end of theta's range in the log"),
-    ("loss", "rudder", {"most": 0.1}, "most is not the end of theta's range in the log"),
-    ("any type", "aileron float", {"what": "aileron bias", "column": "aileron_bias_excluded", "frame": 54},
-     "a sum of frames says nothing of this type"),
-    ("loss", "rudder", {"theta": "constant"}, "the scenario does not declare a constant parameter"),
-    ("abrupt loss", None, {"theta": "constant"}, "the scenario does not declare a constant parameter"),
-    ("abrupt loss", "rudder", {"theta": "constant"}, ""),
-    ("abrupt loss", "rudder", {"theta": "constant", "terms": frame(EARLY)},
-     "a frame before the alarm may be healthy"),
-    ("loss", "rudder", WHERE_SHOWN, "only a fault type is at fault where health fails"),
-    ("any type", "aileron float", WHERE_SHOWN | {"terms": frame(EARLY)}, "health explains a frame"),
-    ("any type", "aileron float", WHERE_SHOWN | {"terms": frame(52, since=49, pole_per_s=9.0)},
-     "health explains a frame"),
-    ("any type", "aileron loss_of_effectiveness that varies", WHERE_SHOWN,
-     "theta of this type is not one number"),
-    ("loss", "rudder", {"terms": frame(52)}, "a frame after the event cannot have caused it"),
-    ("loss", "rudder", {"terms": frame(51, pole_per_s=5.0, since=51)}, NO_ORDER),
-    ("gyros", "rudder", {"terms.0.since": 38}, NO_ORDER),
-    ("loss", None, {"terms.0.h": [0.0]}, "an alarm has no effect of a fault"),
-    ("loss", "rudder", {"terms.0.x.0.0": times(1.01)}, "x is not that of the log"),
-    ("tolerances", "rudder", {"terms.0.rest.0.0": -1.0}, "rest: a part of a bound is below zero"),
-    ("tolerances", "rudder", {"terms.0.rest.0.0": times(1.01)}, "the declared bounds are not the log's"),
-    ("any type", "rudder_position", {"terms.0.h.0": times(1.01)}, "h is not that of the log"),
-    ("filters begun long ago", "aileron", {"terms.0.fault": 0.0}, "the effect before the written"),
-    ("gyros", "document", {"declared": {name: {} for name in "cbgoBm"}}, "the declared error of gyro p is"),
-    ("gyros", "rudder", {"terms.0.pole_per_s": -5.0}, "term: pole_per_s is not allowed"),
-    ("gyros", "rudder", {"terms.0.weight": -1.0}, "term: weight is not allowed"),
-    ("gyros", "rudder", {"frame": EARLY, "terms": frame(EARLY)}, "fie_rudder_excluded is not set in row 30"),
-    ("loss", "rudder", {"what": "elevator", "column": "fie_elevator_excluded"}, "fie_elevator_excluded is"),
-    ("an altimeter", None, {"looks.0.2": -2.0}, "looks: a bound is below zero"),
-    ("an altimeter", None, {"test": "V"}, "the log has another test in this row"),
-    ("chance", None, {"level": -50.0}, "statement: level is not allowed"),
-    ("gyros", "rudder", {"theta": "course"},
-     "statement: theta is not allowed, allowed: One of: any, constant, constant while it shows."),
-    ("gyros", "rudder", {"looks": [[1.0, 2.0, 3.0]]}, "the statement has no evidence, or more than one kind"),
-    ("gyros", "rudder", {"note": "true"}, "statement: the field note is not known"),
-    ("gyros", "document", {"note": "true"}, "certificate: the field note is not known"),
-    ("gyros", "rudder", {"terms.0.note": "true"}, "term: the field note is not known"),
-    ("gyros", "rudder", {"terms.0.d": [0.0, 0.0, 0.0]}, "the direction is zero"),
-    ("gyros", "rudder", {"terms.0.first": 54}, "the frames are not in order"),
-    ("gyros", "rudder", {"terms.0.r": [-0.1] * 16}, "term: r is not allowed"),
-    ("gyros", "rudder", {"terms.0.fault": -0.1}, "term: fault is not allowed"),
-    ("any type", "aileron bias", {"bounds.0.Z.0": 0.0}, "the surface does not act along this direction"),
-    ("any type", "aileron bias", {"bounds": []}, "the evidence is empty"),
-    ("any type", "aileron hardover up", {"pace_rad_s": 0.0}, "statement: pace_rad_s is not allowed"),
-    ("any type", "aileron rate_limit", {"step": -1e-9}, "statement: step is not allowed"),
-    ("chance", None, {"axes": [2, 2]}, "axes: one or two different ones are allowed"),
-    ("chance", None, {"axes": [0, 3]}, "statement: axes is not allowed"),
-    ("chance", None, {"sense": "more"}, "statement: sense is not allowed"),
-    ("chance", None, {"R.0": -1.0}, "statement: R is not allowed"),
-    ("chance", None, {"P.3.0": 0.31}, "P is no covariance"),
-    ("chance", None, {"P.2.2": -1e-9}, "P is no covariance"),
-    ("chance", None, {"first": 0}, "frames are missing"),
-    ("chance", None, {"tolerance": [0.0]}, "statement: tolerance is not allowed"),
-    ("chance", None, {"frames.0.jitter.0": -0.1}, "frame: jitter is not allowed"),
-    ("chance", None, {"frames.1.drift": [[2.0, 0.3], [0.2, 1.0]]}, "drift is no covariance"),
-    ("chance", None, {"frames.0.drift": [[0.1, 0.3], [0.3, 0.1]]}, "drift is no covariance"),
-    ("chance", None, {"frames.0.keep": 1.1}, "frame: keep is not allowed"),
-    ("chance", None, {"frames.1.keep": 0.9}, "the frames have different fields"),
-    ("chance", None, {"frames.0.pace": -0.1}, "frame: pace is not allowed"),
-    ("no vane", None, {"frame": 4.5}, "statement: the field frame is missing, or no row"),
-    ("no vane", None, {"frame": True}, "statement: the field frame is missing, or no row"),
-    ("no vane", None, {"missing": [4]}, "the log says that another reading is missing, or none"),
-    ("no vane", "document", {"format": 4}, "this checker reads format 5, not 4"),
-    ("no vane", "document", {"declared": []}, "certificate: declared is not allowed, allowed: A mapping."),
-]  # fmt: skip
+def changed_to(value, node, key, log):
+    """What a row of `refused` puts in the place of what a node has there."""
+    match value:
+        case {"times": factor}:
+            return factor * node[key]
+        case {"frame": k, **more}:
+            return [single_frame(k, log, **more)]
+    return value
 
 
 def holder_of(document, place):
@@ -341,14 +190,14 @@ def holder_of(document, place):
     return reduce(getitem, within, document), last
 
 
-@pytest.mark.parametrize(("name", "what", "changes", "says"), REFUSED)
+@pytest.mark.parametrize(("name", "what", "changes", "says"), GIVEN["refused"])
 def test_what_is_another_is_refused_in_words(name, what, changes, says):
     certificate, log = flown(name)
     other = copy.deepcopy(certificate)
     found = [other] if what == "document" else [one for one in other["statements"] if one["what"] == what]
     for place, value in changes.items():
         node, key = holder_of(found[0], place)
-        node[key] = value(node[key], log) if callable(value) else value
+        node[key] = changed_to(value, node, key, log)
     refused = refusals(name, with_digest(other))
     whys = [why.rpartition(" excluded: ")[2].removeprefix("alarm: ")[: len(says)] for why in refused]
     assert whys[:1] == [says] * bool(says)

@@ -10,6 +10,7 @@ from beaver_ftc.plant.linear import LinearModel
 from beaver_ftc.results.log import MemoryLog
 from beaver_ftc.studies.handling import (
     LIMITS,
+    Limit,
     of_model,
     where_ended,
     where_trimmed,
@@ -88,3 +89,8 @@ def _as_row(flown):
 
     point = trim(flown)
     return {**point.as_dict(), **{f"{s}_effective_rad": angle for s, angle in point.surfaces_rad.items()}}
+
+
+def test_a_margin_is_the_distance_from_the_nearer_limit_of_a_level():
+    limit = Limit("mode", "quantity", "clause", ((2.0, 5.0), (1.0, 9.0)))
+    assert [limit.margin(3.5, 1), limit.margin(3.5, 2), limit.margin(1.5, 1)] == [1.5, 2.5, -0.5]

@@ -1,5 +1,7 @@
 """`beaver-ftc import gtm`: what it refuses, and the folder it writes."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from scipy.io import savemat
@@ -9,6 +11,7 @@ from beaver_ftc.aircraft.aircraft import UnknownAircraft
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_aircraft.gtm import conversion
 from beaver_ftc_aircraft.gtm.database import read
+from beaver_ftc_aircraft.gtm.folder import regions
 from beaver_ftc_aircraft.gtm.parameters import cases, parameters
 from products.aircraft.gtm import made
 
@@ -144,3 +147,9 @@ def test_what_was_imported_before_is_replaced_and_nothing_else(tmp_path, monkeyp
         with pytest.raises(BadInput, match=says):
             conversion.convert(tmp_path / "database", tmp_path)
         assert (tmp_path / "gtm" / "mine.txt").exists()
+
+
+def test_parts_of_the_envelope_overlap_by_a_meter_per_second():
+    speeds = [part.airspeed_mps for part in regions()]
+    assert [after[0] - before[1] for before, after in pairwise(speeds)] == [-1.0] * 4
+    assert (speeds[0][0], speeds[-1][1]) == (33.0, 60.0)

@@ -1,6 +1,8 @@
 """The wall of names by itself: what Python is about to do, handed to the hook as Python would."""
 
 import os
+import re
+from pathlib import Path
 
 import pytest
 
@@ -77,3 +79,16 @@ def test_what_computing_takes_is_let_through():
         for arguments in every:
             hook(event, arguments)
     assert told == []
+
+
+@pytest.mark.parametrize(
+    ("place", "header"),
+    [(0, "/usr/include/x86_64-linux-gnu/asm/unistd_64.h"), (1, "/usr/include/asm-generic/unistd.h")],
+)
+def test_calls_have_the_numbers_of_the_system(place, header):
+    if not Path(header).exists():
+        pytest.skip(f"{header} is not there")
+    defined = dict(re.findall(r"#define __NR(?:3264)?_(\w+)\s+(\d+)", Path(header).read_text()))
+    defined.setdefault("newfstatat", defined.get("fstatat"))
+    numbers = {name: numbers[place] for name, *numbers in map(str.split, confine._CALLS.split(","))}
+    assert numbers == {name: defined.get(name, "0") for name in numbers}

@@ -5,6 +5,8 @@ from types import SimpleNamespace
 import pytest
 
 import beaver_ftc as bf
+from beaver_ftc.loop.changing import take_diagnosis
+from beaver_ftc.loop.loop import Loop
 from flying import loss, same_log, scenario
 
 LAWS = ("nominal", "adaptive", "fault-tolerant-published", "oracle", "indi")
@@ -148,3 +150,10 @@ def test_a_mistake_is_said_in_one_line_and_the_flight_goes_on(change, says):
     assert "\n" not in str(refusal.value)
     sim.step(frames=10)
     assert sim.scenario_flown().changes == ()
+
+
+def test_a_new_diagnosis_knows_that_the_levers_have_been_apart():
+    frame, new = (Loop(scenario(duration_s=1.0)).frames[0].copy() for _ in range(2))
+    frame["fdi"]["engine_monitor"]["memory"]["levers_apart"] = 1
+    take_diagnosis(frame, new, 5)
+    assert frame["fdi"]["engine_monitor"]["memory"]["levers_apart"] == 1

@@ -241,12 +241,14 @@ def servo_positions(
 class Frames(NamedTuple):
     """Means over the frames that end at k = 0, 1, ...; row 0 is not a number.
 
-    F, G, Gu: f + G u, G, the effect of each surface; r: tolerance for a fault that changes in the frame.
+    F, G, Gu, u: f + G u, G, the effect of each surface, its position; r: tolerance for a fault that changes
+    in the frame.
     """
 
     F: np.ndarray
     G: np.ndarray
     Gu: np.ndarray
+    u: np.ndarray
     r: np.ndarray
 
 
@@ -267,5 +269,5 @@ def frames_of(declaration: Declaration, f: np.ndarray, G: np.ndarray, u: np.ndar
         r = np.abs(by_frame[:, 0] - by_frame[:, 1:].mean(axis=1)) / n
     return Frames(
         mean_of_frames(n, f + Gu.sum(axis=-1)), mean_of_frames(n, G), mean_of_frames(n, Gu),
-        np.concatenate([np.zeros((1, *Gu.shape[1:])), r]),
+        mean_of_frames(n, u), np.concatenate([np.zeros((1, *Gu.shape[1:])), r]),
     )  # fmt: skip

@@ -224,13 +224,12 @@ class Statistical:
         self.abrupt = declaration["fault_profile"] == "abrupt"
 
     def effects(self, k: int) -> tuple[np.ndarray, float]:
-        """G of the frame before times the positions of this one, (3, surfaces), 0 in the first frame; and
-        the pitch acceleration of a coefficient 1 on alpha^3."""
-        G, Gu = self.frames.G, self.frames.Gu
+        """G of the frame before times the mean positions of this one, (3, surfaces), 0 in the first frame;
+        and the pitch acceleration of a coefficient 1 on alpha^3."""
+        G, u = self.frames.G, self.frames.u
         before = G[k - 1] if k > 1 else np.zeros_like(G[k])
-        share = np.divide(before, G[k], out=np.zeros_like(before), where=G[k] != 0.0)
         model, y = self.noise.model, self.noise.y[k * self.declaration.n]
-        return share * Gu[k], model.inertia["Qm"] * y[3] * model.aircraft.S * model.aircraft.c * y[0] ** 3
+        return before * u[k], model.inertia["Qm"] * y[3] * model.aircraft.S * model.aircraft.c * y[0] ** 3
 
     def take(self, k: int, nu: np.ndarray) -> dict[str, float]:
         """Frame k; the shares of the alarm level by column. Outside the boxes of a derived model no alarm."""

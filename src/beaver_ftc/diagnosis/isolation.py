@@ -241,25 +241,25 @@ def update_effects(iso, bank, bound, config, detected, G, Gu, e_Gu):
 
 
 @kernel
-def fault_possible(iso, fie, bank, nu_max, abrupt, x, started):
+def fault_possible(iso, fie, bank, nu_max, abrupt, x, before):
     """True if no test that is switched on excludes the fault of estimator fie:
 
         test                    switched on for
         residual, thresholds    every estimator
         reach                   every estimator, if `reach`
-        one theta, one frame    positions, and with `shared` losses too; not in the first frame of the
-                                isolation unless `reach`
-        sets over frames        losses, if `narrows` and abrupt; not in the first frame
+        one theta, one frame    positions, and with `shared` losses too; not in the frame of the alarm
+                                unless `reach`
+        sets over frames        losses, if `narrows` and abrupt; not in the frame of the alarm
 
     The tests run in this order, and none runs after one that excludes the fault.
-    started: the isolation started a frame or more ago.
+    before: the alarm came a frame or more ago.
     """
     possible = update_residual(fie, iso.config.mu_kind, x)
     if iso.config.reach:
         possible = possible and is_reachable(bank, fie, iso.config.shared)
-    if (iso.config.shared or fie.hypothesis_kind == POSITION_HYPOTHESIS) and (started or iso.config.reach):
+    if (iso.config.shared or fie.hypothesis_kind == POSITION_HYPOTHESIS) and (before or iso.config.reach):
         possible = possible and theta_explains(fie, bank.output.innovation, nu_max)
-    if iso.config.narrows and abrupt and started and fie.hypothesis_kind == LOSS:
+    if iso.config.narrows and abrupt and before and fie.hypothesis_kind == LOSS:
         possible = possible and narrow_sets(fie, bank.output.innovation, nu_max, iso.config.shared)
     return possible
 

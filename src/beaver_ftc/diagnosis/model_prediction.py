@@ -26,9 +26,9 @@ DEFAULT_RATE_RAD_S = pi / 3.0  # of an actuator with no declared rate limit: the
 @sized
 def frame_sums_dtype(n: int) -> np.dtype:
     """Means over the instants of a frame so far, of n surfaces, to which each instant adds its share w: F,
-    G u, bounds eta_bar, rad/s2; G, rad/s2 per rad; eG, eGu as in `bound_dtype`."""
+    G u, bounds eta_bar, rad/s2; G, rad/s2 per rad; u, rad; eG, eGu as in `bound_dtype`."""
     return record(
-        F=3, G=(3, n), Gu=(3, n), eta_bar=3, eG=(3, n), eGu=(3, n),
+        F=3, G=(3, n), Gu=(3, n), u=n, eta_bar=3, eG=(3, n), eGu=(3, n),
         Gu_first=(3, n),  # w G u of the first instant alone
         G_min=n, G_max=n,  # extremes of G on each surface's dominant axis
         u_min=n, u_max=n,  # extremes of the position, rad
@@ -42,9 +42,10 @@ def frame_means_dtype(n: int) -> np.dtype:
         G=(3, n), Gu=(3, n),  # rad/s2 per rad; rad/s2
         e_Gu=(3, n),  # error of Gu if a fault changes within the frame, rad/s2: `fill_change_tolerance`
         F=3,  # f + G u, rad/s2
-        # With G of the frame before. It does not depend on the measurement noise of this frame, to which the
+        u=n,  # rad
+        # G of the frame before. It does not depend on the measurement noise of this frame, to which the
         # control law reacts: with G of this frame that reaction would correlate with the noise.
-        G_old=(3, n), Gu_old=(3, n),
+        G_old=(3, n),
         # If faults of every type are examined, extremes within the frame: of G on each surface's dominant
         # axis, and of the position of the healthy surface, rad.
         G_min=n, G_max=n, u_min=n, u_max=n,
@@ -121,7 +122,7 @@ def add_to_sums(pred, bound, layout, all_types):
     """Add w times this instant to the means over the frame; for faults of all types, update the extremes:
 
     F <- F + w (f + sum_s G_s u_s)      Gu_s <- Gu_s + w G_s u_s      eGu_s <- eGu_s + w eG_s |u_s|
-    G, eG, eta_bar likewise             extra_j <- extra_j + w extra_bound(j)      j: level of travel
+    G, u, eG, eta_bar likewise          extra_j <- extra_j + w extra_bound(j)      j: level of travel
 
     eG and eGu only with has_eG, extra only with one_free.
     """
@@ -130,6 +131,8 @@ def add_to_sums(pred, bound, layout, all_types):
     u = pred.u
     w = pred.w
     eG = bound.declared_errors.eG
+    for s in range(u.size):
+        sums.u[s] += w * u[s]
     for i in range(3):
         sums.F[i] += w * pred.f[i]
         sums.eta_bar[i] += w * bound.eta_now[i]
@@ -153,7 +156,7 @@ def add_to_sums(pred, bound, layout, all_types):
 
 @kernel
 def fill_means(pred, bound):
-    """Copy the sums, which are complete, to the means over the elapsed frame: G, G u of each surface,
+    """Copy the sums, which are complete, to the means over the elapsed frame: G, u, G u of each surface,
     F = f + G u, the extremes, and the bounds eta_bar, eG and eGu. G_old keeps the G of the frame before. With
     several instants a frame, fill e_Gu, too."""
     sums = pred.sums
@@ -161,6 +164,7 @@ def fill_means(pred, bound):
     copy(means.G, means.G_old)
     copy(sums.G, means.G)
     copy(sums.Gu, means.Gu)
+    copy(sums.u, means.u)
     means.F = sums.F
     copy(sums.G_min, means.G_min)
     copy(sums.G_max, means.G_max)
@@ -172,17 +176,6 @@ def fill_means(pred, bound):
         copy(sums.eGu, bound.eGu)
     if pred.w < 1.0:
         fill_change_tolerance(pred)
-
-
-@kernel
-def fill_old_effects(means):
-    """Gu_old = (G_old / G) Gu, (3, n) rad/s2: the effect of each surface with G of the frame before."""
-    G_old = means.G_old
-    G = means.G
-    Gu = means.Gu
-    for i in range(3):
-        for s in range(G.shape[1]):
-            means.Gu_old[i, s] = (G_old[i, s] / G[i, s] if G[i, s] != 0.0 else 0.0) * Gu[i, s]
 
 
 @kernel
@@ -227,7 +220,7 @@ def begin_sums(pred, bound, layout, all_types, meas):
     pred.x_before = meas.x
     bound.n_old = bound.n_gyro
     sums.F[:] = sums.eta_bar[:] = bound.extra[:] = 0.0
-    sums.G[:] = sums.Gu[:] = sums.eG[:] = sums.eGu[:] = 0.0
+    sums.G[:] = sums.Gu[:] = sums.u[:] = sums.eG[:] = sums.eGu[:] = 0.0
     sums.G_min[:] = sums.u_min[:] = np.inf
     sums.G_max[:] = sums.u_max[:] = -np.inf
     add_to_sums(pred, bound, layout, all_types)

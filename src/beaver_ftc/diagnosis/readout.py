@@ -1,7 +1,7 @@
 """The diagnosis at one frame, as certificates, studies and integrations read it: values with names and units.
 
-The layout of the records is the business of their stages alone. A readout copies what it returns: it does not
-change when the flight goes on. `fdi` is a record of `schemes.fdi_dtype`.
+The layout of the records is the business of their stages alone. A readout copies each part when it is
+first read, which does not change from then on. `fdi` is a record of `schemes.fdi_dtype`.
 """
 
 from collections.abc import Callable

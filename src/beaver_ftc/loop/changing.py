@@ -136,4 +136,6 @@ def take_diagnosis(frame: np.void, new: np.void, k: int) -> None:
     prepare_takeover(new["fdi"], in_flight=k > 0)
     if new["fdi"]["bank"]["config"]["n_filters"] != frame["fdi"]["bank"]["config"]["n_filters"]:
         frame["accounts"]["closest"]["filter"] = 0.0  # of other filters nothing is known
+    # thrust lags the levers: what they did before still counts
+    new["fdi"]["engine_monitor"]["memory"] = frame["fdi"]["engine_monitor"]["memory"]
     frame["fdi"], frame["since"] = new["fdi"], k

@@ -23,7 +23,7 @@ _ROW = types.Array(types.float64, 1, "C")
 
 
 _NUMBERS = {
-    "k": types.int64, "j": types.int64, "mode": types.int64, "started": types.int64,
+    "k": types.int64, "j": types.int64, "mode": types.int64, "before": types.int64,
     "by_observer": types.boolean,
     "t": types.float64, "share": types.float64, "probe": types.float64,
     "commanded": _ROW, "row": _ROW, "effectiveness": _ROW,

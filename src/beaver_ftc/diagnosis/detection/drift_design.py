@@ -126,9 +126,6 @@ def derive_length(stat: np.void, V: float, rate_hz: float, longest_m: float) -> 
     later than the gust. A gust with a longer correlation length is represented by a stronger one, of equal
     power at low frequency and more power at high frequency.
     """
-    if stat["noise"]["q"] == 0.0:
-        # 0 in still air: nothing is declared that drifts, and the two blocks are one
-        return longest_m
     T = 2 ** (N_SLOTS - 1) / rate_hz
     z = float(stat["test"]["alarm_level"])
     tau = sqrt(2.0 * T / stat["noise"]["q"]) / z

@@ -29,11 +29,12 @@ size that the signature had at the onset. These hypotheses raise no alarm; they 
 a fault of a surface can explain the data.
 
 In air that is calmer than declared, a part lambda p of g is predictable, to which the control law reacts
-(whitening.py). The evidence that this part contributes is subtracted.
+(whitening.py). The evidence that this part contributes is subtracted from
+that of hypotheses with a sign, which follow the commands of the law.
 
 A gust may be visible to the vanes only roughly, if no force separates it from the aircraft's own motion
 (gusts.py). It correlates with the surfaces of a law that uses the vanes. Its response is whitened likewise,
-and the evidence that it contributes is subtracted.
+and the evidence that it contributes is subtracted likewise.
 
 blocks.py has the records, and the onsets that are tested.
 
@@ -215,7 +216,7 @@ def accumulate_evidence(b, dt, decay):
 def uncertain_share(t, k, r0, r1):
     """The share of |N| in test k that a bounded uncertainty explains, the room of statistical.md:
 
-        room = eta_bar (|g_0| sum |w| + 1.2 / K_d sum |dw|) = e_0 + min(e_tv + eta_r' |w|, e_w)
+        room = e_0 + min(e_tv + eta_r' |w|, e_w)  <=  eta_bar (|g_0| sum |w| + RINGING / K_d sum |dw|)
 
     dw: change of w from frame to frame; r0, r1: eta_r of the two axes. eta_r' |w| is the change when the
     weight drops to zero after the last frame. The changes of a slow uncertainty itself may be less: then e_w

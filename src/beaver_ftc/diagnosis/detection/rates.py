@@ -199,8 +199,8 @@ def finish_rows(rows, noise, forces, gust, vaned, vaneless, bound, means, nu, pe
     gust, vaned, vaneless: the estimates that RATES, VANED (if forces are in use) and VANELESS subtract; RAW
     subtracts none. Q contains the noise of an estimate by vanes, so std[RAW] is an upper limit. `begin_rows`
     has filled std[RATES]. INERTIAL has no rows of the rates. means: of the prediction;
-    G and Gu of surfaces are with the effects of the frame before (see `forces.predict_force`). per_cubed: see
-    ROWS_RECORD.
+    G of a surface is that of the frame before, Gu the same times u of this frame (see `frame_means_dtype`).
+    per_cubed: see ROWS_RECORD.
     """
     rows.per_cubed = per_cubed
     for i in range(3):
@@ -213,5 +213,5 @@ def finish_rows(rows, noise, forces, gust, vaned, vaneless, bound, means, nu, pe
         rows.std[VANELESS, i] = rows.std[RAW, i] + forces.gust_noise[i]
         for s in range(means.G.shape[1]):
             rows.G[s, i] = means.G_old[i, s]
-            rows.Gu[s, i] = means.Gu_old[i, s]
+            rows.Gu[s, i] = means.G_old[i, s] * means.u[s]
             rows.e_G[s, i] = bound.eG[i, s]

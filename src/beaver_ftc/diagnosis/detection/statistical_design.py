@@ -75,7 +75,7 @@ def configure_statistics(fdi: np.void, declared: Declared, model: np.void, trim:
     """Fill the statistical part of a diagnosis record; trim: x (3,), y and u (surfaces,) in trim.
 
     The order of the calls counts: each may read what those before it have filled. Levels and gust come first,
-    then rows, blocks, their drift, the forces and the views.
+    then rows, blocks, their drift, the forces and the views, the filters without gust and the attitude last.
     """
     stat = fdi["statistical"]
     settings = declared.fdi.statistical

@@ -6,8 +6,9 @@ With D_x (3, 3) 1/s the damping of the rates, and nu (3,) rad/s2 the innovation,
 
     W' = nu - D_x W        `advance_gyro_estimate`
 
-follows an error of a gyro exactly. If the attitude has the error, W stays within its bound. `judge_gyros`
-compares W and the innovation with the error of the gyro that the attitude shows.
+follows an error of a gyro, as exactly as D_x is known (DAMPING_TOLERANCE). If the attitude has the error, W
+stays within its bound. `judge_gyros` compares W and the innovation with the error of the gyro that the
+attitude shows.
 
 Letters, in addition to those of redundancy.py:
 
@@ -34,13 +35,14 @@ SAMPLES_IN_JUMP = 4.0  # a jump is the difference of two residuals, each with th
 MIN_TRANSIENT = 2.0  # least size of a transient over the bound on noise: noise may be all of a smaller one
 TRANSIENT_LEFT = 0.003  # largest share of a transient that is left in the next frame
 RATE_ROUNDING = 1e-6  # rad/s, and rad/s2: the part of the bounds that covers rounding
-# stage: 1 after the first sample and while the pitch is too steep, 2 with the first whole frame, 3 from
-# the next frame on: only then the innovation contains the change of a gyro's error between two frames
+# stage: 0 before the first sample, 1 after it and while the pitch is too steep, 2 with the first whole frame,
+# 3 from the next frame on: only then the innovation contains the change of a gyro's error between two frames
 FULL_STAGE = 3
 
 # The error of one gyro. Its sizes are kept by frame, because the innovation covers a frame, and a frame may
 # have several samples:
-#     shown, shown_past              error at the first sample of this frame, and of the frame before, rad/s
+#     shown, shown_past              error that the first sample of this frame shows, and of the frame
+#                                    before, rad/s
 #     most, most_past, most_older    largest |error| in the other samples of this frame and of the two before
 #     least, least_past              smallest |error| in the other samples of this frame and of the one before
 #     gap, B_gap (poles,)            filtered difference of the turns that attitude and W show, and its bound,
@@ -123,9 +125,9 @@ def restart_comparison(mon):
 
 @kernel
 def advance_stage(mon):
-    """Advance `stage` at the start of a frame, up to FULL_STAGE. While it is still smaller, widen the bound
-    on W by the error that the attitude shows, because an error that a gyro has had from the first sample on
-    has caused no innovation.
+    """Advance `stage` at the start of a frame, up to FULL_STAGE. While it is then still smaller, widen the
+    bound on W by the error that the attitude shows, because an error that a gyro has had from the first
+    sample on has caused no innovation.
     """
     if mon.stage < FULL_STAGE and mon.substep == 0:
         mon.stage += 1

@@ -146,7 +146,7 @@ def accumulate_substep(fdi, prediction, measured):
 
 
 def kernels_of_scheme(fdi: np.void) -> Iterator[Any]:
-    """The kernels that a flight compiles apart, of its scheme."""
+    """The kernels that a flight of one instant a frame compiles apart, of its scheme."""
     cfg, ours = fdi["config"], adaptive_estimators
     scheme = cfg["scheme_number"]
     yield begin_scheme

@@ -59,8 +59,9 @@ def follow_alarm(fdi, meas, axis, t):
 def continue_isolation(fdi, meas, t, before):
     """From the alarm on, exclude faults and decide; before: whether the alarm came a frame or more ago.
 
-    Where sensors are monitored, the isolation starts one frame after the alarm, because the attitude reveals
-    a gyro fault one frame late (later where it is noisy). With a broken sensor or engine nothing is isolated.
+    Where sensors are monitored, the isolation starts when `sensor_monitor.allows_isolation` holds: one frame
+    after the alarm, because the attitude reveals a gyro fault one frame late, or later where it is noisy.
+    While a gyro is in doubt, exclusions are only pending. With a broken engine nothing is isolated.
     """
     monitor = fdi.sensor_monitor
     if not before:
@@ -106,13 +107,13 @@ def exclude_or_wait(fdi, fie, possible, t):
 
 
 @kernel
-def isolate(fdi, meas, t, started):
-    """Exclude faults at t s, and decide; started: whether the isolation started a frame or more ago. If only
+def isolate(fdi, meas, t, before):
+    """Exclude faults at t s, and decide; before: whether the alarm came a frame or more ago. If only
     the exclusions of the statistical detector count, the worst case excludes nothing. While a gyro may be the
     cause of the alarm, nothing is decided."""
     cfg, iso, bank = fdi.config, fdi.isolation, fdi.bank
     for j, fie in enumerate(iso.estimator[: iso.config.n_estimators]):
-        possible = isolation.fault_possible(iso, fie, bank, fdi.bound.nu_max, cfg.abrupt, meas.x, started)
+        possible = isolation.fault_possible(iso, fie, bank, fdi.bound.nu_max, cfg.abrupt, meas.x, before)
         possible = possible or cfg.exclusion_authority == STATISTICAL_DETECTOR
         if possible and cfg.exclusion_authority != WORST_CASE_DETECTOR:
             if cfg.diagnoses_all_types:
@@ -122,14 +123,14 @@ def isolate(fdi, meas, t, started):
             possible = not fie.unlikely
         exclude_or_wait(fdi, fie, possible, t)
     if cfg.diagnoses_all_types:
-        decide_type(fdi, t, started)
+        decide_type(fdi, t, before)
     elif not sensor_monitor.doubts_gyros(fdi.sensor_monitor):
         conclusion.set_isolated(fdi.verdict, isolation.decide_isolation(iso, t), t)
 
 
 @apart
-def decide_type(fdi, t, started):
-    """Examine the frame, in the first one of the isolation only with pairs or `reach`. Then decide on which
+def decide_type(fdi, t, before):
+    """Examine the frame, in the frame of the alarm only with pairs or `reach`. Then decide on which
     surface, or two of them, there is a fault, and of which type, unless a gyro may be the cause of the alarm.
     """
     types, concluded, layout, bank = fdi.types, fdi.verdict, fdi.layout, fdi.bank
@@ -138,7 +139,7 @@ def decide_type(fdi, t, started):
         srf.not_at_position = fies[layout.position[s]].excluded
     if types.pair.enabled:
         pairs.observe_pairs(types, layout, fies, bank, bound.nu_max)
-    elif started or fdi.isolation.config.reach:
+    elif before or fdi.isolation.config.reach:
         examination.observe_frame(types, layout, fies, bank.output.innovation, bound)
     if sensor_monitor.doubts_gyros(fdi.sensor_monitor):
         return
@@ -191,7 +192,8 @@ def update_verdict(fdi, prediction, measured, t):
 @kernel
 def find_alarm_axis(fdi, y, t):
     """The axis on which a detector raises the alarm, or -1. An engine that fails before any alarm is outside
-    the class: the alarm is in yaw, and no surface is isolated. y: measured signals."""
+    the class: the alarm is in yaw, the verdict UNANTICIPATED, and no surface is isolated. y: measured
+    signals."""
     limit = fdi.bound.error_map.Cn_now
     concluded = fdi.verdict
     if not concluded.detected and engine_monitor.detect_engine_failure(fdi.engine_monitor, limit, y):

@@ -17,7 +17,7 @@ from beaver_ftc.diagnosis import gusts
 from beaver_ftc.diagnosis.detection import attitude, forces, parity, statistical
 from beaver_ftc.diagnosis.detection.flow_angles import fill_vaneless_y
 from beaver_ftc.diagnosis.detection.rates import finish_rows
-from beaver_ftc.diagnosis.model_prediction import fill_old_effects, innovation_known
+from beaver_ftc.diagnosis.model_prediction import innovation_known
 from beaver_ftc.diagnosis.monitors import gyro_or_attitude
 
 
@@ -46,7 +46,6 @@ def fill_rows(fdi, prediction, y):
     for gust in (stat.vaneless, stat.vaned):
         if gust.output.gusty:
             gusts.finish_gust(gust, prediction.w)
-    fill_old_effects(means)
     alpha_cubed = unanticipated_pitch(prediction.design, y, 1.0)
     finish_rows(
         stat.rows, stat.noise, stat.forces, stat.gust, gust_of_views(stat), stat.vaneless, fdi.bound, means,

@@ -89,9 +89,10 @@ TYPES = (
         reset_memory=reset_memory, see_frame=see_frame, consistent_interval=consistent_interval,
         memory_record_name="oscillatory",
         memory_dtype=record(
-            sign=int, since=int,  # sign of p - u, and the frame since which p - u has had it
+            sign=int, since=int,  # sign of p - u; the frame from which the present half-cycle is timed
             n_half=int, first_end=int, last_end=int,  # half-cycles that have ended; end of the first and last
-            square=float, square_past=float,  # sums of (p - u)^2, rad2: this half-cycle, whole ones before
+            # sums of (p - u)^2, rad2: of this half-cycle from its second frame on; of whole ones before
+            square=float, square_past=float,
         ),
         has_shown=has_shown, show_half_cycles=2, evidence_at_rest=REST_EXCLUDES_TYPE,
         can_look_like=("rate_limit",),

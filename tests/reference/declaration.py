@@ -6,17 +6,17 @@ SI units and radians. Axes and their names: 0 p roll, 1 q pitch, 2 r yaw.
 
 from dataclasses import dataclass
 from functools import cached_property
-from math import prod, radians
+from math import hypot, prod, radians, sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
 
 AXES = "pqr"
-MOMENTS = ("Cl", "Cm", "Cn")
+MOMENTS, FORCES = ("Cl", "Cm", "Cn"), ("CX", "CY", "CZ")
 READINGS = ("p", "q", "r", "alpha", "beta", "V", "qdyn")  # in the order of x, then y
 SUFFIXES = {
     **dict.fromkeys("pqr", ("deg_s", radians(1.0))),
-    **dict.fromkeys(("alpha", "beta"), ("deg", radians(1.0))),
+    **dict.fromkeys(("alpha", "beta", "phi", "theta", "psi"), ("deg", radians(1.0))),
     "V": ("mps", 1.0), "qdyn": ("pa", 1.0), "altitude": ("m", 1.0),
     "engine_rpm": ("rpm", 1.0), "manifold_pressure": ("inhg", 1.0),
 }  # fmt: skip
@@ -36,6 +36,11 @@ class Error(NamedTuple):
     def o(self) -> float:
         """detection.md, error of a reading: o = 4 sigma + |bias| + resolution / 2."""
         return NOISE_LIMIT_SIGMA * self.sigma + abs(self.bias) + self.resolution / 2.0
+
+    @property
+    def random(self) -> float:
+        """Standard deviation of noise and rounding, hypot(sigma, resolution / sqrt(12))."""
+        return hypot(self.sigma, self.resolution / sqrt(12.0))
 
     def e(self, v: np.ndarray) -> np.ndarray:
         """detection.md, error of a reading v: e = (o + slope |v|) / (1 - slope)."""
@@ -75,13 +80,22 @@ class AircraftFile:
     @cached_property
     def terms(self) -> list[Term]:
         """Every term of the three moments, in the order of the file."""
+        return self._terms("moments", MOMENTS)
+
+    @cached_property
+    def forces(self) -> list[Term]:
+        """The same of the forces, without those of the rate of sideslip; none where the file has none."""
+        return [t for t in self._terms("forces", FORCES) if "betadoth" not in dict(t.powers)]
+
+    def _terms(self, section: str, coefficients: tuple[str, ...]) -> list[Term]:
+        of_section = self.file.get(section) or {}
         return [
             Term(
                 axis, term["name"], term["value"], tuple(term["of"].items()),
                 self.surfaces.index(term["surface"]) if term.get("surface") else None,
             )
-            for axis, moment in enumerate(MOMENTS)
-            for term in self.file["moments"].get(moment) or ()
+            for axis, coefficient in enumerate(coefficients)
+            for term in of_section.get(coefficient) or ()
         ]  # fmt: skip
 
     @cached_property

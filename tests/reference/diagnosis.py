@@ -22,14 +22,16 @@ from reference.types import Loss
 class Readings(NamedTuple):
     """What the diagnosis reads, a row for each instant: JSBSim steps from the first frame on, n_s a frame.
 
-    x (instants, 3) rad/s; y (instants, 4 + signals): alpha, beta, V, qdyn, signals; command (instants,
-    surfaces) rad: the one that acts at the end of each step. After the alarm also, a row for each frame, what
-    the law takes for known: network (frames, 3) rad/s2 and effectiveness (frames, surfaces).
+    x (instants, 3) rad/s; y (instants, 4 + signals): alpha, beta, V, qdyn, signals; attitude (instants, 3)
+    rad: bank, pitch, heading; command (instants, surfaces) rad: the one that acts at the end of each step.
+    After the alarm also, a row for each frame, what the law takes for known: network (frames, 3) rad/s2 and
+    effectiveness (frames, surfaces).
     trim: x, y, u at the start of the flight.
     """
 
     x: np.ndarray
     y: np.ndarray
+    attitude: np.ndarray
     command: np.ndarray
     network: np.ndarray
     effectiveness: np.ndarray
@@ -86,7 +88,7 @@ def diagnose(declaration: Declaration, readings: Readings) -> Result:
         bank.E[:, 0] = approximation_residual(declaration, bank, 0, flight, readings)
     detector = None
     if declaration.statistical:
-        noise = Noise(declaration, bounds, readings.trim)
+        noise = Noise(declaration, bounds, readings.attitude, readings.trim)
         detector = Statistical(declaration, noise, frames)
     isolation = Isolation(declaration, bank, frames, bounds, G[0])
     naming = None

@@ -16,6 +16,7 @@ from reference.declaration import AircraftFile, Declaration
 from reference.diagnosis import Readings
 
 FLOW = ("alpha_rad", "beta_rad", "airspeed_mps", "qdyn_pa")
+ATTITUDE = ["phi_rad", "theta_rad", "psi_rad"]
 _files: dict[str, AircraftFile] = {}
 
 
@@ -36,16 +37,15 @@ def read(document: dict[str, Any], log: Any, declaration: Declaration) -> Readin
     network = log[[f"{axis}_network_rad_s2" for axis in "pqr"]].to_numpy()
     effectiveness = log[[f"{s}_effectiveness_used" for s in aircraft.surfaces]].to_numpy()
     if n == 1 and document.get("sensors", "ideal") == "ideal":
-        y = log[[*FLOW, *aircraft.signals]].to_numpy()
-        return Readings(x, y, command, network, effectiveness, (x[0], y[0], command[0]))
+        y, attitude = log[[*FLOW, *aircraft.signals]].to_numpy(), log[ATTITUDE].to_numpy()
+        return Readings(x, y, attitude, command, network, effectiveness, (x[0], y[0], command[0]))
     seen, at_each_step = _Recorder(), np.repeat(command[1:], n, axis=0)
     bf.fly(_by_the_step(document, n), detector=seen, law=_Player(at_each_step))
     frames = min(len(x), (len(seen.x) - 1) // n + 1)  # an aircraft may be lost inside the last frame
     steps = (frames - 1) * n + 1
     commands = np.concatenate([command[:1], at_each_step])[:steps]
-    found = Readings(
-        np.array(seen.x)[:steps], np.array(seen.y)[:steps], commands, network, effectiveness, seen.trim
-    )
+    of_steps = [np.array(seen_so_far)[:steps] for seen_so_far in (seen.x, seen.y, seen.attitude)]
+    found = Readings(*of_steps, commands, network, effectiveness, seen.trim)
     assert np.array_equal(found.x[::n], x[:frames]), "the second flight is another one"
     return found
 
@@ -67,10 +67,12 @@ class _Recorder:
         self.trim = context.trim_x, context.trim_y, context.trim_rad
         self.x: list[np.ndarray] = []
         self.y: list[np.ndarray] = []
+        self.attitude: list[np.ndarray] = []
 
     def step(self, measured: Any, command: np.ndarray) -> Any:
         self.x.append(measured.x)
         self.y.append(measured.y)
+        self.attitude.append(measured.attitude)
         return bf.Verdict()
 
 

@@ -1,5 +1,4 @@
-"""The noise model of the statistical detector, in still air. Page: statistical.md (state model, unknown
-constants).
+"""The noise model of the statistical detector. Page: statistical.md (state model, unknown constants).
 
 Arrays have a row for each instant. What is said of a frame is that of the instant at which it starts, unless
 it is a mean over the frame.
@@ -19,18 +18,13 @@ from reference.bounds import (
     published_bound,
 )
 from reference.declaration import NOISE_LIMIT_SIGMA, Declaration
+from reference.gusts import Gusts
 from reference.prediction import powers, signals_of
 
 ONSETS = 10
 EXACT_GYRO_RAD_S, LEAST_BOUND_RAD_S2, MOST_MAPPED_RAD_S2 = 1e-9, 1e-3, 100.0
 FULL_CHANGE_SHARE_OF_TRAVEL = 0.25  # a derived model's error goes from one end of its bound to the other
 AIR_DATA = ("alpha", "beta", "V", "qdyn")
-
-
-def random_error(declaration: Declaration, reading: str) -> float:
-    """Standard deviation of a reading: noise and rounding, hypot(sigma, resolution / sqrt(12))."""
-    error = declaration.error(reading)
-    return hypot(error.sigma, error.resolution / sqrt(12.0))
 
 
 def tests_of(declaration: Declaration) -> int:
@@ -65,18 +59,25 @@ def drift_power(eta_bar: float, omega: float, sigma: float, z: float, dt: float)
 class Noise:
     """What is not a fault: drift, variance of f + G u, bounded error, unknown constants; of one flight."""
 
-    def __init__(self, declaration: Declaration, bounds: Bounds, trim: tuple[np.ndarray, ...]) -> None:
+    def __init__(
+        self, declaration: Declaration, bounds: Bounds, attitude: np.ndarray, trim: tuple[np.ndarray, ...]
+    ) -> None:  # fmt: skip
         self.declaration, self.model, self.bounds, self.trim = declaration, bounds.model, bounds, trim
         self.x, self.y, self.u = bounds.x, bounds.y, bounds.u
         self.tests = tests_of(declaration)
         z = self.z = alarm_level(declaration, self.tests)
-        self.gyro = np.array([max(random_error(declaration, gyro), EXACT_GYRO_RAD_S) for gyro in "pqr"])
+        self.gyro = np.array([max(declaration.error(gyro).random, EXACT_GYRO_RAD_S) for gyro in "pqr"])
         self.omega = declaration["statistical.uncertainty_rad_s"]
         b, dt = declaration.per_axis("bounds.constant_rad_s2").max(), declaration.dt
-        exact = max(random_error(declaration, gyro) for gyro in "pqr")
+        exact = max(declaration.error(gyro).random for gyro in "pqr")
         self.intensity = drift_power(b, self.omega, exact, z, dt)
         window = 2 ** (ONSETS - 1) * dt
         self.length = trim[1][2] * sqrt(2.0 * window / self.intensity) / z  # m, of the drift that returns
+        self.gusts, self.of_gusts = None, np.zeros((2, *self.x.shape))
+        if declaration["bounds.turbulence"] != "none":
+            of_flight = self.x, self.y, self.u, attitude
+            self.gusts = Gusts(declaration, self.model, of_flight, trim[1], z)
+            self.of_gusts = self.gusts.effects
         self.eta_bar = self._bounded()
         self.change = self._change()
         self.slopes = self._slopes()
@@ -135,15 +136,32 @@ class Noise:
     def reading_sigma(self) -> np.ndarray:
         """(5,): standard deviations of the air data, and of the power, whose error is four of them."""
         power = power_errors(self.declaration)
-        sigmas = [random_error(self.declaration, name) for name in AIR_DATA]
+        sigmas = [self.declaration.error(name).random for name in AIR_DATA]
         return np.array([*sigmas, power[0] / NOISE_LIMIT_SIGMA if power else 0.0])
 
     def _variance(self) -> np.ndarray:
         """(instants, 3): variance of f + G u by noise of the readings; of gyros with the slopes at trim."""
         x0, y0, u0 = self.trim
         f_x = self.model.derivatives(x0, y0, u0)[0]
-        exact = np.array([random_error(self.declaration, gyro) for gyro in "pqr"])
-        return f_x**2 @ exact**2 + ((self.slopes * self.reading_sigma[:, None]) ** 2).sum(axis=1)
+        exact = np.array([self.declaration.error(gyro).random for gyro in "pqr"])
+        of_gusts = self.gusts.noise if self.gusts else 0.0
+        return of_gusts + f_x**2 @ exact**2 + ((self.slopes * self.reading_sigma[:, None]) ** 2).sum(axis=1)
+
+    def returning(self, axis: int, returns: bool) -> tuple[float, float]:
+        """Length of the drift of a group that begins with an axis, m, and factor on the intensity of gusts.
+
+            length = min(V tau, length of the gust),   factor = (length of the gust / length)^2
+
+        Of a roll known coarsely the least of the lengths is the limit. The drift of pitch returns too if no
+        pitching gust is measured; other drifts are random walks, of infinite length."""
+        coarse = self.gusts and not self.gusts.measured
+        if not returns and (axis != 1 or not coarse):
+            return np.inf, 1.0
+        if not self.gusts:
+            return self.length, 1.0
+        of_gust = self.gusts.lengths[axis]
+        length = min(self.length, of_gust, *self.gusts.lengths[returns:][: 2 * coarse * returns])
+        return length, (of_gust / length) ** 2
 
     def _coefficients(self) -> np.ndarray:
         """(instants, terms, 3): acceleration that each moment coefficient multiplies."""
@@ -184,10 +202,12 @@ class Noise:
         return np.array(found)
 
     def known(self, k: int, terms: list[int], axes: list[int]) -> np.ndarray:
-        """(constants, axes): regressors of the frame that ends at k, means over it: terms, then readings."""
+        """(constants, axes): regressors of the frame that ends at k, means over it: terms, then readings. Then
+        the coarse effect of gusts, and a place for what calm air makes predictable."""
         of_it = slice((k - 1) * self.declaration.n, k * self.declaration.n)
         both = self.coefficients[of_it][:, terms], self.slopes[of_it]
-        return np.concatenate(both, axis=1).mean(axis=0)[:, axes]
+        means = np.concatenate(both, axis=1).mean(axis=0)
+        return np.array([*means, self.of_gusts[1, k], np.zeros(3)])[:, axes]
 
     @property
     def steady(self) -> np.ndarray:

@@ -70,6 +70,8 @@ class DesignModel:
             )
             for term in self.aircraft.terms
         ]
+        self.forces = [t._replace(value=t.value * scale.get(t.name, 1.0)) for t in self.aircraft.forces]
+        self.mass = self.aircraft.file["mass"]["mass_kg"] * mass
         self.linearised, self.frozen_alpha = wrong.get("linearised", False), wrong.get("frozen_alpha", False)
 
     def anchor(self, x0: np.ndarray, y0: np.ndarray, u0: np.ndarray) -> None:
@@ -160,6 +162,19 @@ class DesignModel:
     def _per_coefficient(self, y: np.ndarray) -> list[np.ndarray]:
         """qdyn S b, qdyn S c, qdyn S b: moment of a coefficient of 1, N m."""
         return [y[..., 3] * self.aircraft.S * arm for arm in self.aircraft.arm]
+
+    def specific_force(self, x: np.ndarray, y: np.ndarray, u: np.ndarray) -> np.ndarray:
+        """(instants, 3) m/s2, body axes: force over mass, qdyn S C(x, y, u) / m."""
+        C, signal = np.zeros_like(x), signals_of(self.aircraft, x, y)
+        for t in self.forces:
+            C[:, t.axis] += t.value * powers(t, signal) * (1.0 if t.surface is None else u[:, t.surface])
+        return y[:, 3:4] * self.aircraft.S / self.mass * C
+
+    def rate_damping(self, y: np.ndarray) -> np.ndarray:
+        """D (..., 3, 3) 1/s: slope of the accelerations by the moments (rows) with the rates against the air
+        (columns), by complex steps. Without rates, because the moments are linear in them."""
+        along = [self.nonlinear_f(direction, y).imag for direction in 1e-30j * np.eye(3)]
+        return np.stack(along, axis=-1) / 1e-30
 
     def inertia_errors(self, share: float) -> dict[str, float]:
         """Largest change of each inertia coefficient for Ix, Iy, Iz, Jxz within a share: it is at a corner,

@@ -4,11 +4,12 @@
     N = sum w' g,   D = sum w' g_chi,   w = S^-1 g_chi
 
 g is the whitened innovation (nu-tilde of the page), e the error of the estimated rate (x-tilde), g_chi the
-response to a signature. Hypotheses are rows, onsets columns. In still air, for the published class.
+response to a signature. Hypotheses are rows, onsets columns. For the published class.
 """
 
 from collections.abc import Callable
-from math import exp
+from copy import copy
+from math import exp, sqrt
 from statistics import NormalDist
 from typing import NamedTuple
 
@@ -21,7 +22,7 @@ from reference.prediction import Frames
 LOSS, STEP, CUBE, GROWING, ENDING = "loss", "step", "alpha^3", "growing", "ending"
 SENSE = {LOSS: -1.0, GROWING: -1.0, ENDING: 1.0, STEP: 0.0, CUBE: 0.0}
 GROWTH_PER_S, RINGING, NOISE_SHARE, LEAST_SHARE = 1.5, 1.2, 0.5, 0.25
-PRIOR_DRIFT_RAD_S2, PRIOR_LOSS = 1.0, 12.0
+PRIOR_DRIFT_RAD_S2, PRIOR_LOSS, PRIOR_CALM = 1.0, 12.0, 4.0
 
 
 class Fault(NamedTuple):
@@ -58,11 +59,16 @@ class Group:
     def __init__(self, noise: Noise, axes: tuple[int, ...], returns: bool) -> None:
         declaration = self.declaration = noise.declaration
         self.noise, self.z, self.dt = noise, noise.z, declaration.dt
-        self.axes, self.returns = list(axes), returns
+        self.axes, self.returns, self.calm = list(axes), returns, None
+        self.length, self.factor = noise.returning(axes[0], returns)
+        if noise.gusts:
+            still = copy(noise)
+            still.gusts = None
+            self.calm, self.of_calm = Group(still, axes, False), np.zeros(2)
         self.faults = faults_of(declaration, axes)
         n, h = len(axes), len(self.faults)
         self.terms = [j for j, t in enumerate(noise.model.terms) if t.axis in axes]
-        self.tol = np.concatenate([noise.tolerance[self.terms], noise.steady])
+        self.tol = np.concatenate([noise.tolerance[self.terms], noise.steady, [0.0, 0.0]])
         self.R = np.diag(noise.gyro[self.axes] ** 2)
         self.P_xx, self.P_xd, self.P_dd = self.R.copy(), np.zeros((n, n)), PRIOR_DRIFT_RAD_S2**2 * np.eye(n)
         self.e, self.d = np.zeros(n), np.zeros(n)
@@ -74,7 +80,7 @@ class Group:
         self.left, self.at_end = np.zeros((h, ONSETS)), np.zeros((h, ONSETS, n))
         self.upper, self.theta, self.information = np.zeros(h), np.zeros(h), np.zeros(h)
         self.sense = np.array([SENSE[fault.kind] for fault in self.faults])[:, None]
-        exact = declaration["bounds.sensors"] == "ideal"
+        exact = declaration["bounds.sensors"] == "ideal" and not noise.gusts
         self.noise_share = 0.0 if exact else NOISE_SHARE
 
     def restart(self, k: int) -> None:
@@ -90,20 +96,39 @@ class Group:
 
     def gains(self, start: int) -> None:
         """Covariances over a frame, then K_x = P_xx S^-1, K_d = P_xd' S^-1, P <- P - K S K'. start: the
-        instant at which the frame starts. Per axis, eta_bar^2 times the intensity drives the drift."""
-        noise, dt = self.noise, self.dt
-        V = noise.y[start, 2]
-        a = self.alpha = exp(-dt * V / noise.length) if self.returns else 1.0
+        instant at which the frame starts. Per axis, eta_bar^2 times the intensity drives the drift; so does
+        what is unmeasured of gusts, whose axes may turn fast."""
+        noise, dt, of_gusts = self.noise, self.dt, 0.0
+        a = self.alpha = exp(-dt * noise.y[start, 2] / self.length)
+        if self.calm:
+            self.calm.gains(start)
+            axes, frame = np.ix_(self.axes, self.axes), start // self.declaration.n + 1
+            self.P_dd = self.P_dd + self.factor * noise.gusts.by_turn[frame][axes]
+            of_gusts = self.factor * noise.gusts.drift[self.returns][start][axes]
         bound = np.maximum(noise.eta_bar[start, self.axes], LEAST_BOUND_RAD_S2)
         jitter = np.diag(noise.variance[start, self.axes])
         P_xx = self.P_xx + dt * (self.P_xd + self.P_xd.T) + dt**2 * self.P_dd + dt**2 * jitter
         P_xd = a * (self.P_xd + dt * self.P_dd)
-        P_dd = a * a * self.P_dd + dt * np.diag(noise.intensity * bound**2)
-        self.S = P_xx + self.R
+        P_dd = a * a * self.P_dd + dt * (np.diag(noise.intensity * bound**2) + of_gusts)
+        self.S = (P_xx + P_xx.T) / 2.0 + self.R
         S_inv = self.S_inv = np.linalg.inv(self.S)
         self.K_x, self.K_d = P_xx @ S_inv, P_xd.T @ S_inv
         self.P_xx, self.P_xd = P_xx - self.K_x @ P_xx, P_xd - self.K_x @ P_xd
         self.P_dd = P_dd - self.K_d @ P_xd
+
+    def predictable(self, nu: np.ndarray, g: np.ndarray) -> np.ndarray:
+        """Calm air: lambda p, what is predictable of g, rad/s. Sums fade with 2 s.
+
+            p = g - g_calm,   lambda = (sum p' S^-1 g + 4 + 2 sqrt(D)) / D,   D = 4 + sum p' S^-1 p
+
+        lambda: at most 1, and not negative. g_calm: of a filter without gusts, whose drift is a random walk.
+        """
+        calm = self.calm
+        g_calm, calm.e, calm.d = calm.white(calm.e, calm.d, nu)
+        p = g - g_calm
+        self.of_calm = exp(-self.dt / 2.0) * self.of_calm + np.array([g, p]) @ self.S_inv @ p
+        pg, D = self.of_calm + [0.0, PRIOR_CALM]
+        return p * min(max((pg + PRIOR_CALM + 2.0 * sqrt(D)) / D, 0.0), 1.0)
 
     def white(
         self, e: np.ndarray, d: np.ndarray, nu: np.ndarray
@@ -153,6 +178,8 @@ class Group:
         self.responses(start)
         g, self.e, self.d = self.white(self.e, self.d, nu[self.axes])
         g_j, self.e_j, self.d_j = self.white(self.e_j, self.d_j, known)
+        if self.calm:
+            g_j[-1] = self.predictable(nu[self.axes], g)
         g_chi, self.e_chi, self.d_chi = self.white(self.e_chi, self.d_chi, chi)
         w = g_chi @ self.S_inv.T
         self.N = forget * self.N + w @ g
@@ -167,13 +194,14 @@ class Group:
     def judge(self, forget_upper: float, mapped: bool) -> None:
         """Scores and bounds on the log-likelihood ratios of each hypothesis, over its onsets.
 
-            score = (evidence - sum tol_j |N_j|) / max(sqrt(D), room / z + sqrt(D) / 2)
+            score = (evidence - allowed) / max(sqrt(D), room / z + sqrt(D) / 2)
 
-        room: constant part, and the smaller of the sum of changes (with the last drop of w to 0) and the sum
+        allowed: sum tol_j |N_j|, and what a coarse gust and calm air, the last two N_j, say for a loss; room: constant part, and the smaller of the sum of changes (with the last drop of w to 0) and the sum
         for a slow error. forget_upper: if a loss may end, factor on upper bounds of frames before; the bounds
         then leave room out, except those of other hypotheses than losses on a derived aircraft (`mapped`).
         """
-        by_constants = np.abs(self.N_j) @ self.tol
+        by_air = np.maximum(self.sense[..., None] * self.N_j[..., -2:], 0.0)
+        allowed = np.abs(self.N_j) @ self.tol + by_air.sum(axis=-1)
         room = self.settled + np.minimum(self.varying + np.abs(self.w) @ self.transient, self.slow)
         one_sided = self.sense != 0.0
         evidence = np.where(one_sided, self.sense * self.N, np.abs(self.N))
@@ -181,9 +209,9 @@ class Group:
         D = np.where(there, self.D, 1.0)
         sigma = np.sqrt(D)
         limit = np.where(room > 0.0, np.maximum(sigma, room / self.z + self.noise_share * sigma), sigma)
-        self.score = np.where(there, (evidence - by_constants) / limit, 0.0).max(axis=1).clip(min=0.0)
+        self.score = np.where(there, (evidence - allowed) / limit, 0.0).max(axis=1).clip(min=0.0)
         counts = np.where(~one_sided & mapped, 1.0, 0.0 if forget_upper > 0.0 else 1.0)
-        error = by_constants + counts * room
+        error = allowed + counts * room
 
         def ratio(of: np.ndarray) -> np.ndarray:
             found = np.where(one_sided & (of > D), of - D / 2.0, of**2 / (2.0 * D))
@@ -243,7 +271,7 @@ class Statistical:
             if not self.alarmed:
                 group.restart(k)
             known = self.noise.known(k, group.terms, group.axes)
-            group.take(k, nu, group.signatures(Gu, cube), known, forget)
+            group.take(k, nu - self.noise.of_gusts[0, k], group.signatures(Gu, cube), known, forget)
             group.judge(0.0 if self.abrupt else forgetting, mapped)
         self.largest, self.axis = 0.0, None
         columns = dict.fromkeys(

@@ -16,7 +16,7 @@ MOMENTS, FORCES = ("Cl", "Cm", "Cn"), ("CX", "CY", "CZ")
 READINGS = ("p", "q", "r", "alpha", "beta", "V", "qdyn")  # in the order of x, then y
 SUFFIXES = {
     **dict.fromkeys("pqr", ("deg_s", radians(1.0))),
-    **dict.fromkeys(("alpha", "beta", "phi", "theta", "psi"), ("deg", radians(1.0))),
+    **dict.fromkeys(("alpha", "beta"), ("deg", radians(1.0))),
     "V": ("mps", 1.0), "qdyn": ("pa", 1.0), "altitude": ("m", 1.0),
     "engine_rpm": ("rpm", 1.0), "manifold_pressure": ("inhg", 1.0),
 }  # fmt: skip

@@ -41,10 +41,10 @@ def read(document: dict[str, Any], log: Any, declaration: Declaration) -> Readin
         return Readings(x, y, attitude, command, network, effectiveness, (x[0], y[0], command[0]))
     seen, at_each_step = _Recorder(), np.repeat(command[1:], n, axis=0)
     bf.fly(_by_the_step(document, n), detector=seen, law=_Player(at_each_step))
-    frames = min(len(x), (len(seen.x) - 1) // n + 1)  # an aircraft may be lost inside the last frame
+    frames = min(len(x), (len(seen.read) - 1) // n + 1)  # an aircraft may be lost inside the last frame
     steps = (frames - 1) * n + 1
     commands = np.concatenate([command[:1], at_each_step])[:steps]
-    of_steps = [np.array(seen_so_far)[:steps] for seen_so_far in (seen.x, seen.y, seen.attitude)]
+    of_steps = (np.array(rows[:steps]) for rows in zip(*seen.read, strict=True))
     found = Readings(*of_steps, commands, network, effectiveness, seen.trim)
     assert np.array_equal(found.x[::n], x[:frames]), "the second flight is another one"
     return found
@@ -65,14 +65,10 @@ class _Recorder:
 
     def reset(self, context: Any) -> None:
         self.trim = context.trim_x, context.trim_y, context.trim_rad
-        self.x: list[np.ndarray] = []
-        self.y: list[np.ndarray] = []
-        self.attitude: list[np.ndarray] = []
+        self.read: list[tuple[np.ndarray, ...]] = []
 
     def step(self, measured: Any, command: np.ndarray) -> Any:
-        self.x.append(measured.x)
-        self.y.append(measured.y)
-        self.attitude.append(measured.attitude)
+        self.read.append((measured.x, measured.y, measured.attitude))
         return bf.Verdict()
 
 

@@ -66,18 +66,17 @@ class Noise:
         self.x, self.y, self.u = bounds.x, bounds.y, bounds.u
         self.tests = tests_of(declaration)
         z = self.z = alarm_level(declaration, self.tests)
-        self.gyro = np.array([max(declaration.error(gyro).random, EXACT_GYRO_RAD_S) for gyro in "pqr"])
+        self.exact = np.array([declaration.error(gyro).random for gyro in "pqr"])
+        self.gyro = np.maximum(self.exact, EXACT_GYRO_RAD_S)
         self.omega = declaration["statistical.uncertainty_rad_s"]
         b, dt = declaration.per_axis("bounds.constant_rad_s2").max(), declaration.dt
-        exact = max(declaration.error(gyro).random for gyro in "pqr")
-        self.intensity = drift_power(b, self.omega, exact, z, dt)
+        self.intensity = drift_power(b, self.omega, self.exact.max(), z, dt)
         window = 2 ** (ONSETS - 1) * dt
         self.length = trim[1][2] * sqrt(2.0 * window / self.intensity) / z  # m, of the drift that returns
-        self.gusts, self.of_gusts = None, np.zeros((2, *self.x.shape))
+        self.gusts = None
         if declaration["bounds.turbulence"] != "none":
-            of_flight = self.x, self.y, self.u, attitude
-            self.gusts = Gusts(declaration, self.model, of_flight, trim[1], z)
-            self.of_gusts = self.gusts.effects
+            self.gusts = Gusts(self, attitude)
+            self.length = self.gusts.length
         self.eta_bar = self._bounded()
         self.change = self._change()
         self.slopes = self._slopes()
@@ -143,25 +142,9 @@ class Noise:
         """(instants, 3): variance of f + G u by noise of the readings; of gyros with the slopes at trim."""
         x0, y0, u0 = self.trim
         f_x = self.model.derivatives(x0, y0, u0)[0]
-        exact = np.array([self.declaration.error(gyro).random for gyro in "pqr"])
-        of_gusts = self.gusts.noise if self.gusts else 0.0
-        return of_gusts + f_x**2 @ exact**2 + ((self.slopes * self.reading_sigma[:, None]) ** 2).sum(axis=1)
-
-    def returning(self, axis: int, returns: bool) -> tuple[float, float]:
-        """Length of the drift of a group that begins with an axis, m, and factor on the intensity of gusts.
-
-            length = min(V tau, length of the gust),   factor = (length of the gust / length)^2
-
-        Of a roll known coarsely the least of the lengths is the limit. The drift of pitch returns too if no
-        pitching gust is measured; other drifts are random walks, of infinite length."""
-        coarse = self.gusts and not self.gusts.measured
-        if not returns and (axis != 1 or not coarse):
-            return np.inf, 1.0
-        if not self.gusts:
-            return self.length, 1.0
-        of_gust = self.gusts.lengths[axis]
-        length = min(self.length, of_gust, *self.gusts.lengths[returns:][: 2 * coarse * returns])
-        return length, (of_gust / length) ** 2
+        of_gusts = self.gusts.variance if self.gusts else 0.0
+        of_readings = ((self.slopes * self.reading_sigma[:, None]) ** 2).sum(axis=1)
+        return of_gusts + f_x**2 @ self.exact**2 + of_readings
 
     def _coefficients(self) -> np.ndarray:
         """(instants, terms, 3): acceleration that each moment coefficient multiplies."""
@@ -202,12 +185,10 @@ class Noise:
         return np.array(found)
 
     def known(self, k: int, terms: list[int], axes: list[int]) -> np.ndarray:
-        """(constants, axes): regressors of the frame that ends at k, means over it: terms, then readings. Then
-        the coarse effect of gusts, and a place for what calm air makes predictable."""
+        """(constants, axes): regressors of the frame that ends at k, means over it: terms, then readings."""
         of_it = slice((k - 1) * self.declaration.n, k * self.declaration.n)
         both = self.coefficients[of_it][:, terms], self.slopes[of_it]
-        means = np.concatenate(both, axis=1).mean(axis=0)
-        return np.array([*means, self.of_gusts[1, k], np.zeros(3)])[:, axes]
+        return np.concatenate(both, axis=1).mean(axis=0)[:, axes]
 
     @property
     def steady(self) -> np.ndarray:

@@ -70,7 +70,6 @@ class DesignModel:
             )
             for term in self.aircraft.terms
         ]
-        self.forces = [t._replace(value=t.value * scale.get(t.name, 1.0)) for t in self.aircraft.forces]
         self.mass = self.aircraft.file["mass"]["mass_kg"] * mass
         self.linearised, self.frozen_alpha = wrong.get("linearised", False), wrong.get("frozen_alpha", False)
 
@@ -166,7 +165,7 @@ class DesignModel:
     def specific_force(self, x: np.ndarray, y: np.ndarray, u: np.ndarray) -> np.ndarray:
         """(instants, 3) m/s2, body axes: force over mass, qdyn S C(x, y, u) / m."""
         C, signal = np.zeros_like(x), signals_of(self.aircraft, x, y)
-        for t in self.forces:
+        for t in self.aircraft.forces:
             C[:, t.axis] += t.value * powers(t, signal) * (1.0 if t.surface is None else u[:, t.surface])
         return y[:, 3:4] * self.aircraft.S / self.mass * C
 

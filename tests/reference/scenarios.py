@@ -123,6 +123,7 @@ FACTORS = (
     Factor("true sensors", ("ideal", "as declared")),
     Factor("truth", tuple(TRUTHS)),
     Factor("turbulence", ("none", "light", "moderate")),
+    Factor("air", ("as declared", "calm"), {"turbulence": frozenset({"light", "moderate"})}),
     Factor("law", ("fault-tolerant", "nominal", "adaptive")),
     Factor("reference", tuple(REFERENCES)),
     Factor("fault", ("none", *FAULTS)),
@@ -141,8 +142,8 @@ OF_ALL_TYPES = {
 
 
 def _forbidden(name: str, level: str, other: str, there: str) -> bool:
-    """What is refused: pairs with noise, air that moves about a derived aircraft, faults only ours have; what
-    begins inside a frame, unless abrupt."""
+    """What is refused: pairs with noise, faults only ours have. What is not here: turbulence about a derived
+    aircraft; what begins inside a frame, unless abrupt."""
     if (name, level) == ("course", "growing"):
         return there not in {"fault": FAULTS.keys() - AT_ONCE, "substeps": ("1",)}.get(other, (there,))
     if (name, level) == ("pairs", "true"):
@@ -178,7 +179,7 @@ def document_of(row: dict[str, str], rng: np.random.Generator, name: str) -> Doc
         fdi |= {"sensor_monitor": "never", "pairs": row.get("pairs") == "true"}
         fdi |= DETECTORS[row.get("detector", "worst case")] | SLOWEST[row.get("slowest", "default")]
         fdi |= {"thresholds": row["thresholds"], **SECTIONS["sharpen"][row["sharpen"]]}
-    moving = row["turbulence"] != "none"
+    moving = row.get("air") == "as declared"
     return {
         "name": name, "aircraft": row["aircraft"], "rate_hz": rate_hz, "duration_s": duration_s,
         "substeps": int(row["substeps"]), "seed": int(rng.integers(1000)),

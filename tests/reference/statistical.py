@@ -8,7 +8,6 @@ response to a signature. Hypotheses are rows, onsets columns. For the published 
 """
 
 from collections.abc import Callable
-from copy import copy
 from math import exp, sqrt
 from statistics import NormalDist
 from typing import NamedTuple
@@ -16,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from reference.declaration import Declaration
+from reference.gusts import Gusts
 from reference.noise import LEAST_BOUND_RAD_S2, ONSETS, Noise
 from reference.prediction import Frames
 
@@ -56,26 +56,23 @@ GROUPS = ((1,), (0, 2), (0, 2))  # table 1; the drift of the last one returns
 class Group:
     """The Kalman filter and the tests of a group of axes."""
 
-    def __init__(self, noise: Noise, axes: tuple[int, ...], returns: bool) -> None:
+    def __init__(self, noise: Noise, axes: tuple[int, ...], returns: bool, gusts: Gusts | None) -> None:
         declaration = self.declaration = noise.declaration
         self.noise, self.z, self.dt = noise, noise.z, declaration.dt
         self.axes, self.returns, self.calm = list(axes), returns, None
-        self.length, self.factor = noise.returning(axes[0], returns)
-        if noise.gusts:
-            still = copy(noise)
-            still.gusts = None
-            self.calm, self.of_calm = Group(still, axes, False), np.zeros(2)
+        if gusts:
+            self.walks = gusts.walks[int(returns)][..., axes, :][..., axes]
+            self.calm, self.of_calm = Group(noise, axes, False, None), np.zeros(2)
         self.faults = faults_of(declaration, axes)
         n, h = len(axes), len(self.faults)
         self.terms = [j for j, t in enumerate(noise.model.terms) if t.axis in axes]
-        self.tol = np.concatenate([noise.tolerance[self.terms], noise.steady, [0.0, 0.0]])
+        self.tol = np.concatenate([noise.tolerance[self.terms], noise.steady])
         self.R = np.diag(noise.gyro[self.axes] ** 2)
         self.P_xx, self.P_xd, self.P_dd = self.R.copy(), np.zeros((n, n)), PRIOR_DRIFT_RAD_S2**2 * np.eye(n)
         self.e, self.d = np.zeros(n), np.zeros(n)
         self.e_chi, self.d_chi, self.w = (np.zeros((h, ONSETS, n)) for _ in range(3))
         self.e_j, self.d_j = (np.zeros((len(self.tol), n)) for _ in range(2))
-        self.N, self.D, self.settled, self.varying, self.slow = (np.zeros((h, ONSETS)) for _ in range(5))
-        self.N_j = np.zeros((h, ONSETS, len(self.tol)))
+        self.sums, self.N_j = np.zeros((6, h, ONSETS)), np.zeros((h, ONSETS, len(self.tol)))
         # Until its first restart a slot takes a growing loss for fully grown, and has no end of a loss.
         self.left, self.at_end = np.zeros((h, ONSETS)), np.zeros((h, ONSETS, n))
         self.upper, self.theta, self.information = np.zeros(h), np.zeros(h), np.zeros(h)
@@ -88,8 +85,7 @@ class Group:
         slot = 0
         while k % 2 == 0 and slot < ONSETS - 1:
             k, slot = k // 2, slot + 1
-        for sums in (self.N, self.D, self.settled, self.varying, self.slow):
-            sums[:, slot] = 0.0
+        self.sums[:, :, slot] = 0.0
         for states in (self.e_chi, self.d_chi, self.w, self.N_j):
             states[:, slot] = 0.0
         self.left[:, slot] = 1.0
@@ -97,21 +93,20 @@ class Group:
     def gains(self, start: int) -> None:
         """Covariances over a frame, then K_x = P_xx S^-1, K_d = P_xd' S^-1, P <- P - K S K'. start: the
         instant at which the frame starts. Per axis, eta_bar^2 times the intensity drives the drift; so does
-        what is unmeasured of gusts, whose axes may turn fast."""
-        noise, dt, of_gusts = self.noise, self.dt, 0.0
-        a = self.alpha = exp(-dt * noise.y[start, 2] / self.length)
+        what is unmeasured of gusts, whose axes may turn fast. S is kept symmetric, against rounding."""
+        noise, dt = self.noise, self.dt
+        a = self.alpha = exp(-dt * noise.y[start, 2] / noise.length) if self.returns else 1.0
+        turns = drift = 0.0
         if self.calm:
             self.calm.gains(start)
-            axes, frame = np.ix_(self.axes, self.axes), start // self.declaration.n + 1
-            self.P_dd = self.P_dd + self.factor * noise.gusts.by_turn[frame][axes]
-            of_gusts = self.factor * noise.gusts.drift[self.returns][start][axes]
+            turns, drift = self.walks[:, start // self.declaration.n]
+        self.P_dd = self.P_dd + turns
         bound = np.maximum(noise.eta_bar[start, self.axes], LEAST_BOUND_RAD_S2)
         jitter = np.diag(noise.variance[start, self.axes])
         P_xx = self.P_xx + dt * (self.P_xd + self.P_xd.T) + dt**2 * self.P_dd + dt**2 * jitter
         P_xd = a * (self.P_xd + dt * self.P_dd)
-        P_dd = a * a * self.P_dd + dt * (np.diag(noise.intensity * bound**2) + of_gusts)
-        self.S = (P_xx + P_xx.T) / 2.0 + self.R
-        S_inv = self.S_inv = np.linalg.inv(self.S)
+        P_dd = a * a * self.P_dd + dt * (np.diag(noise.intensity * bound**2) + drift)
+        S_inv = self.S_inv = np.linalg.inv((P_xx + P_xx.T) / 2.0 + self.R)
         self.K_x, self.K_d = P_xx @ S_inv, P_xd.T @ S_inv
         self.P_xx, self.P_xd = P_xx - self.K_x @ P_xx, P_xd - self.K_x @ P_xd
         self.P_dd = P_dd - self.K_d @ P_xd
@@ -127,8 +122,8 @@ class Group:
         g_calm, calm.e, calm.d = calm.white(calm.e, calm.d, nu)
         p = g - g_calm
         self.of_calm = exp(-self.dt / 2.0) * self.of_calm + np.array([g, p]) @ self.S_inv @ p
-        pg, D = self.of_calm + [0.0, PRIOR_CALM]
-        return p * min(max((pg + PRIOR_CALM + 2.0 * sqrt(D)) / D, 0.0), 1.0)
+        pg, D = self.of_calm + np.array([0.0, PRIOR_CALM])
+        return p * np.clip((pg + PRIOR_CALM + 2.0 * sqrt(D)) / D, 0.0, 1.0)
 
     def white(
         self, e: np.ndarray, d: np.ndarray, nu: np.ndarray
@@ -178,35 +173,32 @@ class Group:
         self.responses(start)
         g, self.e, self.d = self.white(self.e, self.d, nu[self.axes])
         g_j, self.e_j, self.d_j = self.white(self.e_j, self.d_j, known)
-        if self.calm:
-            g_j[-1] = self.predictable(nu[self.axes], g)
+        p = self.predictable(nu[self.axes], g) if self.calm else 0.0 * g
         g_chi, self.e_chi, self.d_chi = self.white(self.e_chi, self.d_chi, chi)
         w = g_chi @ self.S_inv.T
-        self.N = forget * self.N + w @ g
-        self.D = forget * self.D + (w * g_chi).sum(axis=-1)
         self.N_j = forget * self.N_j + w @ g_j.T
-        self.settled = forget * self.settled + np.abs(w) @ self.constant
-        self.varying = forget * self.varying + np.abs(w - self.w) @ self.transient
-        change = self.noise.change[frame - 1]
-        self.slow = forget * self.slow + change * (np.abs(w) @ self.transient)
-        self.w = w
+        settled, varying = np.abs(w) @ self.constant, np.abs(w - self.w) @ self.transient
+        slow = self.noise.change[frame - 1] * (np.abs(w) @ self.transient)
+        now = w @ g, w @ p, (w * g_chi).sum(axis=-1), settled, varying, slow
+        self.sums, self.w = forget * self.sums + np.array(now), w
 
     def judge(self, forget_upper: float, mapped: bool) -> None:
         """Scores and bounds on the log-likelihood ratios of each hypothesis, over its onsets.
 
             score = (evidence - allowed) / max(sqrt(D), room / z + sqrt(D) / 2)
 
-        allowed: sum tol_j |N_j|, and what a coarse gust and calm air, the last two N_j, say for a loss; room: constant part, and the smaller of the sum of changes (with the last drop of w to 0) and the sum
-        for a slow error. forget_upper: if a loss may end, factor on upper bounds of frames before; the bounds
-        then leave room out, except those of other hypotheses than losses on a derived aircraft (`mapped`).
+        allowed: sum tol_j |N_j|, and what calm air (N_p) says for a loss. room: constant part, and the
+        smaller of the sum of changes (with the last drop of w to 0) and the sum for a slow error.
+        forget_upper: if a loss may end, factor on upper bounds of frames before; the bounds then leave room
+        out, except those of other hypotheses than losses on a derived aircraft (`mapped`).
         """
-        by_air = np.maximum(self.sense[..., None] * self.N_j[..., -2:], 0.0)
-        allowed = np.abs(self.N_j) @ self.tol + by_air.sum(axis=-1)
-        room = self.settled + np.minimum(self.varying + np.abs(self.w) @ self.transient, self.slow)
+        N, N_p, D, settled, varying, slow = self.sums
+        allowed = np.abs(self.N_j) @ self.tol + np.maximum(self.sense * N_p, 0.0)
+        room = settled + np.minimum(varying + np.abs(self.w) @ self.transient, slow)
         one_sided = self.sense != 0.0
-        evidence = np.where(one_sided, self.sense * self.N, np.abs(self.N))
-        there = self.D > 0.0
-        D = np.where(there, self.D, 1.0)
+        evidence = np.where(one_sided, self.sense * N, np.abs(N))
+        there = D > 0.0
+        D = np.where(there, D, 1.0)
         sigma = np.sqrt(D)
         limit = np.where(room > 0.0, np.maximum(sigma, room / self.z + self.noise_share * sigma), sigma)
         self.score = np.where(there, (evidence - allowed) / limit, 0.0).max(axis=1).clip(min=0.0)
@@ -223,8 +215,8 @@ class Group:
         best = np.where(there, ratio(evidence), -1.0)
         for row in np.flatnonzero(there.any(axis=1)):
             slot = best[row].argmax()
-            self.theta[row] = self._estimate(row, self.N[row, slot], self.D[row, slot])
-            self.information[row] = self.D[row, slot]
+            self.theta[row] = self._estimate(row, N[row, slot], D[row, slot])
+            self.information[row] = D[row, slot]
 
     def _estimate(self, row: int, N: float, D: float) -> float:
         """theta_hat = N / D; of a loss with a prior that is uniform on [-1, 0], variance 1/12."""
@@ -245,7 +237,7 @@ class Statistical:
         self.declaration, self.frames, self.noise, self.z = declaration, frames, noise, noise.z
         share = declaration["statistical.misnaming"] * declaration.dt / noise.tests
         self.margin = NormalDist().inv_cdf(share) ** 2 / 2.0
-        self.groups = [Group(noise, axes, j == 2) for j, axes in enumerate(GROUPS)]
+        self.groups = [Group(noise, axes, j == 2, noise.gusts) for j, axes in enumerate(GROUPS)]
         self.alarmed, self.axis, self.largest = False, None, 0.0
         self.confirmed: set[int] = set()
         self.weak: set[int] = set()
@@ -266,12 +258,13 @@ class Statistical:
         concludes = box is None or box[k * self.declaration.n] >= 0
         forgetting = exp(-self.declaration.dt / self.declaration["forgetting_time_s"])
         forget = forgetting if self.alarmed else 1.0
+        air = self.noise.gusts.effect[k] if self.noise.gusts else 0.0
         mapped = self.noise.bounds.box is not None and not self.declaration.aircraft.file.get("damage")
         for group in self.groups:
             if not self.alarmed:
                 group.restart(k)
             known = self.noise.known(k, group.terms, group.axes)
-            group.take(k, nu - self.noise.of_gusts[0, k], group.signatures(Gu, cube), known, forget)
+            group.take(k, nu - air, group.signatures(Gu, cube), known, forget)
             group.judge(0.0 if self.abrupt else forgetting, mapped)
         self.largest, self.axis = 0.0, None
         columns = dict.fromkeys(

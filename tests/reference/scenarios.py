@@ -96,6 +96,7 @@ REFERENCES: dict[str, Document] = {
 RATES = {"usual": (100, 2.5), "slow": (40, 4.0), "fast": (200, 1.5)}
 STRUCK = frozenset(FAULTS)
 OURS = {"scheme": frozenset({"adaptive-estimators"})}
+STILL = OURS | {"turbulence": frozenset({"none"})}
 DETECTORS: dict[str, Document] = {
     "worst case": {},
     "either": {"statistical": {}},
@@ -113,7 +114,7 @@ FACTORS = (
     Factor("substeps", ("1", "2", "5")),
     Factor("scheme", tuple(SCHEMES)),
     Factor("fault_class", ("published", "all")),
-    Factor("detector", tuple(DETECTORS), OURS | {"fault_class": frozenset({"published"})}),
+    Factor("detector", tuple(DETECTORS), STILL | {"fault_class": frozenset({"published"})}),
     Factor("pairs", ("false", "true"), {"fault_class": frozenset({"all"})}),
     Factor("slowest", tuple(SLOWEST), {"fault_class": frozenset({"all"})}),
     Factor("thresholds", ("interval", "published"), OURS),
@@ -123,7 +124,6 @@ FACTORS = (
     Factor("true sensors", ("ideal", "as declared")),
     Factor("truth", tuple(TRUTHS)),
     Factor("turbulence", ("none", "light", "moderate")),
-    Factor("air", ("as declared", "calm"), {"turbulence": frozenset({"light", "moderate"})}),
     Factor("law", ("fault-tolerant", "nominal", "adaptive")),
     Factor("reference", tuple(REFERENCES)),
     Factor("fault", ("none", *FAULTS)),
@@ -138,6 +138,10 @@ OF_ALL_TYPES = {
     "slowest": ("quick",), "fault": tuple(FAULTS), "turbulence": ("none", "light"),
     "declared sensors": ("ideal", "gyros", "steady"), "design": ("nominal", "heavy"),
     "poles": ("default",), "constant": ("default",), "coupling": ("default",),
+}  # fmt: skip
+IN_GUSTS = {
+    "scheme": ("adaptive-estimators",), "fault_class": ("published",), "detector": tuple(DETECTORS)[1:],
+    "turbulence": ("light", "moderate"), "aircraft": ("beaver", "beaver-split"),
 }  # fmt: skip
 
 
@@ -155,10 +159,13 @@ def _forbidden(name: str, level: str, other: str, there: str) -> bool:
     return False
 
 
-def scenarios(seed: int, of_all_types: bool = False) -> Iterator[Document]:
-    """One covering array after the other, without end; of_all_types: only flights that this class decides."""
-    arrays, kept = 0, OF_ALL_TYPES if of_all_types else {}
-    factors = [replace(one, levels=kept.get(one.name, one.levels)) for one in FACTORS]
+def scenarios(seed: int, kept: dict[str, tuple[str, ...]]) -> Iterator[Document]:
+    """One covering array after the other, without end, of flights with the levels that are kept: all ({}),
+    OF_ALL_TYPES those that this class decides, IN_GUSTS those of the statistical detector in turbulence."""
+    arrays, factors = 0, [replace(one, levels=kept.get(one.name, one.levels)) for one in FACTORS]
+    if kept is IN_GUSTS:
+        factors = [replace(one, needs={}) if one.name == "detector" else one for one in factors]
+        factors.append(Factor("air", ("as declared", "calm")))
     while True:
         rng = np.random.default_rng([seed, arrays])
         for number, row in enumerate(CoveringArray(factors, _forbidden, rng).rows()):
@@ -179,7 +186,7 @@ def document_of(row: dict[str, str], rng: np.random.Generator, name: str) -> Doc
         fdi |= {"sensor_monitor": "never", "pairs": row.get("pairs") == "true"}
         fdi |= DETECTORS[row.get("detector", "worst case")] | SLOWEST[row.get("slowest", "default")]
         fdi |= {"thresholds": row["thresholds"], **SECTIONS["sharpen"][row["sharpen"]]}
-    moving = row.get("air") == "as declared"
+    moving = row["turbulence"] != "none" and row.get("air") != "calm"
     return {
         "name": name, "aircraft": row["aircraft"], "rate_hz": rate_hz, "duration_s": duration_s,
         "substeps": int(row["substeps"]), "seed": int(rng.integers(1000)),

@@ -7,20 +7,22 @@ import pytest
 
 from beaver_ftc.plugins import SERVICES, entries
 from reference.comparison import differences
-from reference.scenarios import scenarios
+from reference.scenarios import IN_GUSTS, OF_ALL_TYPES, scenarios
 from samples import samples
 
 SEED, PARTS = 1, 10
 FLIGHTS = (
-    samples(1000),
-    samples(480),
-)  # by day one covering array of 120, and most of one of faults of all types
+    ({}, samples(1000)),
+    (OF_ALL_TYPES, samples(480)),
+    (IN_GUSTS, samples(240)),
+)  # by day one covering array of 120, most of one of faults of all types, a part of one in gusts
 DERIVES = "derive" in entries(SERVICES)  # without, no aircraft of the jsbsim package flies
 
 
 @cache
-def drawn(of_all_types):
-    return [*islice(scenarios(SEED, of_all_types), FLIGHTS[of_all_types])]
+def drawn(number):
+    kept, flights = FLIGHTS[number]
+    return [*islice(scenarios(SEED, kept), flights)]
 
 
 def differing(drawn):
@@ -31,9 +33,14 @@ def differing(drawn):
 
 @pytest.mark.parametrize("part", range(PARTS))
 def test_columns_alarm_and_names_are_those_of_the_pages(part):
-    assert differing(drawn(False)[part::PARTS]) == []
+    assert differing(drawn(0)[part::PARTS]) == []
 
 
 @pytest.mark.parametrize("part", range(PARTS))
 def test_types_and_candidates_are_those_of_the_page(part):
-    assert differing(drawn(True)[part::PARTS]) == []
+    assert differing(drawn(1)[part::PARTS]) == []
+
+
+@pytest.mark.parametrize("part", range(PARTS))
+def test_the_statistical_detector_in_gusts_is_that_of_the_page(part):
+    assert differing(drawn(2)[part::PARTS]) == []

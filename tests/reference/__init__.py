@@ -14,6 +14,7 @@ It depends on no name of the package but its public ones (flights.py), so the pa
     naming.py        from the types left to surface, type and candidates    fault-types.md
     pairs.py         the same with two faults at once                       fault-types.md
     noise.py         drift, variances, unknown constants and their bounds  statistical.md
+    gusts.py         gusts that vanes measure, and what they leave          statistical.md
     statistical.py   whitened innovation, tests, scores, which loss         statistical.md
     diagnosis.py     a whole flight, and the residual after the alarm
 
@@ -22,7 +23,12 @@ column.
 
 Not here, and not compared: the weights of the network (its output is read from the log), the names of
 `fault_class: all` with `fault_profile: abrupt` (there the rest of a surface that the law gives up is
-evidence), the statistical detector in turbulence (gusts, calm air) and of `fault_class: all` (parity
-directions, forces, oscillations), the sensor monitor, probing, damage, turbulence below 150 m, changes of
-the declaration in flight. Of a fault inside a frame of several JSBSim steps only abrupt ones are compared.
+evidence), the statistical detector of `fault_class: all` (parity directions, forces, oscillations), the
+sensor monitor, probing, damage, turbulence below 200 m, changes of the declaration in flight. Of a fault
+inside a frame of several JSBSim steps only abrupt ones are compared.
+
+Of the statistical detector in turbulence not here: aircraft whose design model has no forces (derived ones;
+their coarse estimate, and accelerometers in its place), declared errors of the attitude, deliberate errors of
+force coefficients, an estimated speed below half the airspeed, and a heading that turns so fast that it hides
+the whole yawing gust (statistical.md: s of 1, about 1 rad/s).
 """

@@ -29,6 +29,5 @@ inside a frame of several JSBSim steps only abrupt ones are compared.
 
 Of the statistical detector in turbulence not here: aircraft whose design model has no forces (derived ones;
 their coarse estimate, and accelerometers in its place), declared errors of the attitude, deliberate errors of
-force coefficients, an estimated speed below half the airspeed, and a heading that turns so fast that it hides
-the whole yawing gust (statistical.md: s of 1, about 1 rad/s).
+force coefficients, and an estimated speed below half the airspeed.
 """

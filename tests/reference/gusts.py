@@ -3,7 +3,7 @@ measure).
 
 Arrays have a row for each instant, unless they are of frames. Level axes: forward, right, down, with the
 heading of the instant. Gusts roll (0), pitch (1) and yaw (2). Not here: aircraft without a model of forces;
-errors of the attitude; a V below half the airspeed; a heading that turns so fast that h (advance) reaches 1.
+errors of the attitude; a V below half the airspeed.
 """
 
 from math import pi, sqrt
@@ -53,22 +53,27 @@ def changes(y: Array, f: Array, T: Array, psi: Array, dt: float) -> list[Array]:
 def advance(
     v: Array, dv: Array, psi_dot: Array, lags: Array, keep: float, limit: float, dt: float
 ) -> list[Array]:  # fmt: skip
-    """Step by step: V (instants,) m/s; w (instants, 2) rad/s, rotation of the air; h (instants,).
+    """Step by step: V (instants,) m/s; w (instants, 2) rad/s, rotation of the air; h, lost (instants,).
 
         v_g <- clip(keep v_g + dv, limit)                   V = |v + v_g|
         w_q <- e^(-dt / tau_q) w_q + dv_z / (V tau_q)       w_r alike, with dv_y
-        h <- max(e^(-dt / tau_r) h, s[k], s[k-1]),          s = psi_dot^2 b L / (pi V^2)
+        h <- min(max(e^(-dt / tau_r) h, s[k], s[k-1]), 1),  s = psi_dot^2 b L / (pi V^2)
+        lost <- keep^2 lost
 
-    h: share of the yawing gust that turns of the heading hide. lags (2,) m: V tau_q and V tau_r.
+    h: share of the yawing gust that turns of the heading hide. If s[k] or s[k-1] reaches 1, w_r only decays,
+    v_g is 0 and lost, the share of sigma^2 that v_g misses, 1. lags (2,) m: V tau_q and V tau_r.
     """
-    (V, s, h), w, v_g = np.zeros((3, len(v))), np.zeros((len(v), 2)), 0.0
+    (V, s, h, lost), w, v_g = np.zeros((4, len(v))), np.zeros((len(v), 2)), 0.0
     for k in range(len(v)):
         v_g = np.clip(keep * v_g + dv[k], -limit, limit)
-        V[k] = np.linalg.norm(v[k] + v_g)
+        V[k], lost[k] = np.linalg.norm(v[k] + v_g), keep**2 * lost[k - 1]
         fade, s[k] = np.exp(-dt * V[k] / lags), (psi_dot[k] / V[k]) ** 2 * lags[1] * L / 3.0
-        h[k] = max(fade[1] * h[k - 1], s[k], s[k - 1])
-        w[k] = fade * w[k - 1] + dv[k, [2, 1]] / lags
-    return [V, w, h]
+        larger = max(s[k], s[k - 1])
+        h[k] = min(max(fade[1] * h[k - 1], larger), 1.0)
+        w[k] = fade * w[k - 1] + dv[k, [2, 1]] / lags * [1.0, larger < 1.0]
+        if larger >= 1.0:
+            v_g, lost[k] = 0.0, 1.0
+    return [V, w, h, lost]
 
 
 class Gusts:
@@ -83,13 +88,14 @@ class Gusts:
     def __init__(self, noise: Any, attitude: Array) -> None:
         """Lags, effect, and what vanes leave of the intensities Q:
 
-            share_j = (1, 0.003, 0.03)_j + (z / 4)^2 var_V / V^2 (j: pitch, yaw) + h (yaw)        at most 1
+            share_j = (1, 0.003, 0.03)_j + (z / 4)^2 (var_V + lost sigma^2) / V^2 + h, at most 1
             drift_ik = max(V_read, V) sum_j (D C)_ij (D C)_kj share_j Q_j
             turns_ik = sum dt V_read sum_j (D C')_ij (D C')_kj tau_j^2 Q_j (1, 0, h)_j / 2
             variance = (D_q s_q)^2 + (D_r s_r)^2,   s_q = (V sigma_alpha + 0.3 sigma_V) / (V tau_q)    at trim
 
-        D: slopes of the accelerations with the rates; C: from the gusts' axes to body axes, C': its change,
-        1/s. Turns count if (max |C'| tau_p)^2 / 2 > 0.01, in the frame and the next. s_r: with sigma_beta.
+        The second share is of pitch and yaw, h of yaw. D: slopes of the accelerations with the rates; C: from
+        the gusts' axes to body axes, C': its change, 1/s. Turns count if (max |C'| tau_p)^2 / 2 > 0.01, in
+        the frame and the next. s_r: with sigma_beta.
         """
         declaration, model, y = noise.declaration, noise.model, noise.y
         sigma, n, b = M_PER_FT * GUST_FT_S[declaration["bounds.turbulence"]], declaration.n, model.aircraft.b
@@ -99,13 +105,13 @@ class Gusts:
         T = about(0, phi) @ about(1, theta)
         v, dv = changes(y, model.specific_force(noise.x, y, noise.u), T, psi, dt)
         turn, (a, var_V) = np.diff(psi, prepend=psi[0]), speed_error(noise, sigma)
-        V, w, h = advance(v, dv, turn / dt, lengths[1:], np.exp(-a * dt), 4.0 * sigma, dt)
+        V, w, h, lost = advance(v, dv, turn / dt, lengths[1:], np.exp(-a * dt), 4.0 * sigma, dt)
         C, D, V_read = T @ about(2, turn), model.rate_damping(y), y[:, 2]
         self.effect = -mean_of_frames(n, times(D @ C[..., 1:], w))
         self.length, sigmas, y0 = min(noise.length, lengths[0]), noise.reading_sigma, noise.trim[1]
         s = (y0[2] * sigmas[:2] + 0.3 * sigmas[2]) / lengths[1:]
         self.variance = (model.rate_damping(y0)[:, 1:] * s) ** 2 @ np.ones(2)
-        by_speed = (noise.z / 4.0) ** 2 * var_V / V**2
+        by_speed = (noise.z / 4.0) ** 2 * (var_V + lost * sigma**2) / V**2
         share = LEFT_BY_VANES + np.array([0.0 * V, by_speed, by_speed + h]).T
         drift = squares(D @ C, np.minimum(share, 1.0) * np.outer(np.maximum(V_read, V), Q))[:-1:n]
         change = np.diff(C, axis=0, prepend=C[:1]) / dt

@@ -134,11 +134,7 @@ class DesignModel:
 
     def nonlinear_f(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """[FDC]: rate products and moments of the terms without a surface."""
-        signal, moment = signals_of(self.aircraft, x, y), self._per_coefficient(y)
-        C = [
-            sum(t.value * powers(t, signal) for t in self.terms if t.axis == axis and t.surface is None)
-            for axis in range(3)
-        ]
+        C, moment = self.coefficients(self.terms, x, y)[:, -1], self._per_coefficient(y)
         return np.stack(
             [
                 sum(self.inertia[K] * x[..., i] * x[..., j] for i, j, K in RATE_PRODUCTS[axis])
@@ -150,11 +146,7 @@ class DesignModel:
 
     def nonlinear_G(self, y: np.ndarray) -> np.ndarray:
         """The same of one radian of each surface."""
-        signal, moment = signals_of(self.aircraft, np.zeros(3), y), self._per_coefficient(y)
-        C = np.zeros((3, len(self.aircraft.surfaces), *y.shape[:-1]), dtype=y.dtype)
-        for t in self.terms:
-            if t.surface is not None:
-                C[t.axis, t.surface] += t.value * powers(t, signal)
+        C, moment = self.coefficients(self.terms, np.zeros(3), y)[:, :-1], self._per_coefficient(y)
         G = [sum(self.inertia[K] * moment[i] * C[i] for i, K in MOMENT_FACTORS[axis]) for axis in range(3)]
         return np.moveaxis(np.array(G), (0, 1), (-2, -1))
 
@@ -162,12 +154,18 @@ class DesignModel:
         """qdyn S b, qdyn S c, qdyn S b: moment of a coefficient of 1, N m."""
         return [y[..., 3] * self.aircraft.S * arm for arm in self.aircraft.arm]
 
+    def coefficients(self, terms: list[Term], x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """(3, surfaces + 1, ...): sum of the terms of a radian of each surface, then of those without."""
+        signal = signals_of(self.aircraft, x, y)
+        C = np.zeros((3, len(self.aircraft.surfaces) + 1, *y.shape[:-1]), dtype=signal["ph"].dtype)
+        for t in terms:
+            C[t.axis, -1 if t.surface is None else t.surface] += t.value * powers(t, signal)
+        return C
+
     def specific_force(self, x: np.ndarray, y: np.ndarray, u: np.ndarray) -> np.ndarray:
         """(instants, 3) m/s2, body axes: force over mass, qdyn S C(x, y, u) / m."""
-        C, signal = np.zeros_like(x), signals_of(self.aircraft, x, y)
-        for t in self.aircraft.forces:
-            C[:, t.axis] += t.value * powers(t, signal) * (1.0 if t.surface is None else u[:, t.surface])
-        return y[:, 3:4] * self.aircraft.S / self.mass * C
+        C = self.coefficients(self.aircraft.forces, x, y)
+        return y[:, 3:4] * self.aircraft.S / self.mass * (C[:, -1] + (C[:, :-1] * u.T).sum(axis=1)).T
 
     def rate_damping(self, y: np.ndarray) -> np.ndarray:
         """D (..., 3, 3) 1/s: slope of the accelerations by the moments (rows) with the rates against the air

@@ -107,7 +107,9 @@ SLOWEST: dict[str, Document] = {
     "default": {}, "quick": {"slowest_oscillation_rad_s": 12.0, "slowest_rate_deg_s": 2.0},
 }  # fmt: skip
 SINUSOID = {"amplitude_rad_s2": 0.02, "frequency_rad_s": 8.0}
-TRUTHS: dict[str, Document] = {"as modelled": {}, "errs": {"sinusoid": dict.fromkeys("pqr", SINUSOID)}}
+TRUTHS: dict[str, Document] = {
+    "as modelled": {}, "errs": {"sinusoid": dict.fromkeys("pqr", SINUSOID)}, "calm": {},
+}  # fmt: skip
 FACTORS = (
     Factor("aircraft", ("beaver", "beaver-split", "jsbsim:c172p")),
     Factor("rate", tuple(RATES)),
@@ -122,7 +124,7 @@ FACTORS = (
     *(Factor(name, tuple(levels), OURS if name == "sharpen" else {}) for name, levels in SECTIONS.items()),
     Factor("declared sensors", tuple(SENSORS)),
     Factor("true sensors", ("ideal", "as declared")),
-    Factor("truth", tuple(TRUTHS)),
+    Factor("truth", ("as modelled", "errs")),
     Factor("turbulence", ("none", "light", "moderate")),
     Factor("law", ("fault-tolerant", "nominal", "adaptive")),
     Factor("reference", tuple(REFERENCES)),
@@ -141,7 +143,7 @@ OF_ALL_TYPES = {
 }  # fmt: skip
 IN_GUSTS = {
     "scheme": ("adaptive-estimators",), "fault_class": ("published",), "detector": tuple(DETECTORS)[1:],
-    "turbulence": ("light", "moderate"), "aircraft": ("beaver", "beaver-split"),
+    "turbulence": ("light", "moderate"), "aircraft": ("beaver", "beaver-split"), "truth": tuple(TRUTHS),
 }  # fmt: skip
 
 
@@ -159,13 +161,13 @@ def _forbidden(name: str, level: str, other: str, there: str) -> bool:
     return False
 
 
-def scenarios(seed: int, kept: dict[str, tuple[str, ...]]) -> Iterator[Document]:
-    """One covering array after the other, without end, of flights with the levels that are kept: all ({}),
-    OF_ALL_TYPES those that this class decides, IN_GUSTS those of the statistical detector in turbulence."""
-    arrays, factors = 0, [replace(one, levels=kept.get(one.name, one.levels)) for one in FACTORS]
+def scenarios(seed: int, kind: int) -> Iterator[Document]:
+    """One covering array after the other, without end: 0 of all flights, 1 of those that the class of all
+    types decides, 2 of the statistical detector in turbulence, or in air that is calmer than declared."""
+    arrays, kept = 0, ({}, OF_ALL_TYPES, IN_GUSTS)[kind]
+    factors = [replace(one, levels=kept.get(one.name, one.levels)) for one in FACTORS]
     if kept is IN_GUSTS:
         factors = [replace(one, needs={}) if one.name == "detector" else one for one in factors]
-        factors.append(Factor("air", ("as declared", "calm")))
     while True:
         rng = np.random.default_rng([seed, arrays])
         for number, row in enumerate(CoveringArray(factors, _forbidden, rng).rows()):
@@ -186,7 +188,7 @@ def document_of(row: dict[str, str], rng: np.random.Generator, name: str) -> Doc
         fdi |= {"sensor_monitor": "never", "pairs": row.get("pairs") == "true"}
         fdi |= DETECTORS[row.get("detector", "worst case")] | SLOWEST[row.get("slowest", "default")]
         fdi |= {"thresholds": row["thresholds"], **SECTIONS["sharpen"][row["sharpen"]]}
-    moving = row["turbulence"] != "none" and row.get("air") != "calm"
+    moving = row["turbulence"] != "none" and row["truth"] != "calm"
     return {
         "name": name, "aircraft": row["aircraft"], "rate_hz": rate_hz, "duration_s": duration_s,
         "substeps": int(row["substeps"]), "seed": int(rng.integers(1000)),

@@ -7,22 +7,21 @@ import pytest
 
 from beaver_ftc.plugins import SERVICES, entries
 from reference.comparison import differences
-from reference.scenarios import IN_GUSTS, OF_ALL_TYPES, scenarios
+from reference.scenarios import scenarios
 from samples import samples
 
 SEED, PARTS = 1, 10
 FLIGHTS = (
-    ({}, samples(1000)),
-    (OF_ALL_TYPES, samples(480)),
-    (IN_GUSTS, samples(240)),
+    samples(1000),
+    samples(480),
+    samples(240),
 )  # by day one covering array of 120, most of one of faults of all types, a part of one in gusts
 DERIVES = "derive" in entries(SERVICES)  # without, no aircraft of the jsbsim package flies
 
 
 @cache
-def drawn(number):
-    kept, flights = FLIGHTS[number]
-    return [*islice(scenarios(SEED, kept), flights)]
+def drawn(kind):
+    return [*islice(scenarios(SEED, kind), FLIGHTS[kind])]
 
 
 def differing(drawn):

@@ -16,7 +16,8 @@ MOMENTS, FORCES = ("Cl", "Cm", "Cn"), ("CX", "CY", "CZ")
 READINGS = ("p", "q", "r", "alpha", "beta", "V", "qdyn")  # in the order of x, then y
 SUFFIXES = {
     **dict.fromkeys("pqr", ("deg_s", radians(1.0))),
-    **dict.fromkeys(("alpha", "beta"), ("deg", radians(1.0))),
+    **dict.fromkeys(("alpha", "beta", "phi", "theta", "psi"), ("deg", radians(1.0))),
+    **dict.fromkeys(("ax", "ay", "az"), ("mps2", 1.0)),
     "V": ("mps", 1.0), "qdyn": ("pa", 1.0), "altitude": ("m", 1.0),
     "engine_rpm": ("rpm", 1.0), "manifold_pressure": ("inhg", 1.0),
 }  # fmt: skip
@@ -274,6 +275,7 @@ DEFAULTS: dict[str, Any] = {
     "bounds": {
         "inertia_coupling": dict.fromkeys(AXES, 0.25), "constant_rad_s2": dict.fromkeys(AXES, 0.02),
         "coefficients": 0.0, "inertia": 0.0, "sensors": "ideal", "deflection_deg": 0.0, "turbulence": "none",
+        "vertical_wind_mps": 1.0,
         "actuators": {},
     },
 }  # fmt: skip

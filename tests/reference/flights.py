@@ -39,15 +39,31 @@ def read(document: dict[str, Any], log: Any, declaration: Declaration) -> Readin
     if n == 1 and document.get("sensors", "ideal") == "ideal":
         y, attitude = log[[*FLOW, *aircraft.signals]].to_numpy(), log[ATTITUDE].to_numpy()
         return Readings(x, y, attitude, command, network, effectiveness, (x[0], y[0], command[0]))
-    seen, at_each_step = _Recorder(), np.repeat(command[1:], n, axis=0)
-    bf.fly(_by_the_step(document, n), detector=seen, law=_Player(at_each_step))
-    frames = min(len(x), (len(seen.read) - 1) // n + 1)  # an aircraft may be lost inside the last frame
+    seen, at_each_step = _seen(document, command, n)
+    frames = min(len(x), (len(seen.measured) - 1) // n + 1)  # an aircraft may be lost inside the last frame
     steps = (frames - 1) * n + 1
     commands = np.concatenate([command[:1], at_each_step])[:steps]
-    of_steps = (np.array(rows[:steps]) for rows in zip(*seen.read, strict=True))
+    of_steps = (
+        np.array([getattr(one, name) for one in seen.measured[:steps]]) for name in ("x", "y", "attitude")
+    )
     found = Readings(*of_steps, commands, network, effectiveness, seen.trim)
     assert np.array_equal(found.x[::n], x[:frames]), "the second flight is another one"
     return found
+
+
+def instruments(document: dict[str, Any], log: Any, declaration: Declaration) -> Any:
+    """What the sensor monitor of this flight reads at every JSBSim step, (14, steps); length of a step, s;
+    airspeed in trim, m/s; altitude of the start, m. No detector is given the readings of the engine."""
+    seen, _ = _seen(document, log.filter(like="_cmd_rad").to_numpy(), declaration.n)
+    Y = [np.hstack([m.x, m.y[:4], m.attitude, m.altitude_m, m.force]) for m in seen.measured]
+    return np.transpose(Y), declaration.dt / declaration.n, seen.trim[1][2], log["altitude_m"][0]
+
+
+def _seen(document: dict[str, Any], command: np.ndarray, n: int) -> Any:
+    """The second flight, and the commands at each step."""
+    seen, at_each_step = _Recorder(), np.repeat(command[1:], n, axis=0)
+    bf.fly(_by_the_step(document, n), detector=seen, law=_Player(at_each_step))
+    return seen, at_each_step
 
 
 def _by_the_step(document: dict[str, Any], n: int) -> dict[str, Any]:
@@ -65,10 +81,10 @@ class _Recorder:
 
     def reset(self, context: Any) -> None:
         self.trim = context.trim_x, context.trim_y, context.trim_rad
-        self.read: list[tuple[np.ndarray, ...]] = []
+        self.measured: list[Any] = []
 
     def step(self, measured: Any, command: np.ndarray) -> Any:
-        self.read.append((measured.x, measured.y, measured.attitude))
+        self.measured.append(measured)
         return bf.Verdict()
 
 

@@ -17,17 +17,26 @@ It depends on no name of the package but its public ones (flights.py), so the pa
     gusts.py         gusts that vanes measure, and what they leave          statistical.md
     statistical.py   whitened innovation, tests, scores, which loss         statistical.md
     diagnosis.py     a whole flight, and the residual after the alarm
+    monitor.py       tests between instruments, their filters and bounds    instruments.md
 
 flights.py, scenarios.py, comparison.py and test_against_flights.py fly a covering array and compare column by
-column.
+column. test_monitor.py flies the drawn flights of monitored.yaml, and compares the largest ratio of residual
+to threshold, its test, that the alarm is raised, and that the name is an instrument "changed by" the test.
 
 Not here, and not compared: the weights of the network (its output is read from the log), the names of
 `fault_class: all` with `fault_profile: abrupt` (there the rest of a surface that the law gives up is
-evidence), the statistical detector of `fault_class: all` (parity directions, forces, oscillations), the
-sensor monitor, probing, damage, turbulence below 200 m, changes of the declaration in flight. Of a fault
-inside a frame of several JSBSim steps only abrupt ones are compared.
+evidence), the statistical detector of `fault_class: all` (parity directions, forces, oscillations), probing,
+damage, turbulence below 200 m, changes of the declaration in flight. Of a fault inside a frame of several
+JSBSim steps only abrupt ones are compared.
 
 Of the statistical detector in turbulence not here: aircraft whose design model has no forces (derived ones;
 their coarse estimate, and accelerometers in its place), declared errors of the attitude, deliberate errors of
 force coefficients, and an estimated speed below half the airspeed.
+
+Of the sensor monitor not here, and not compared: the tests 11 and 12 (no plug-in reads the engine's
+instruments) and those of additional sensors, the pause in a steep attitude, exclusion of candidates by other
+tests, its two comparisons (gyro or attitude angle; accelerometer, vane or airspeed), instruments broken from
+the start, frozen readings, substitutes (so the ratios end with the name), the test of gyros by the
+statistical detector, failed engines, gusts below 150 m or above 1.4 times the airspeed in trim, slope errors
+of the heading.
 """

@@ -7,16 +7,18 @@ import law_records
 from beaver_ftc.compiled import fill
 from beaver_ftc.control import accommodation
 from beaver_ftc.control.accommodation import (
+    MODE_ADAPTIVE,
     MODE_NOMINAL,
+    MODE_REALLOCATED,
+    MODE_UNANTICIPATED,
 )
 from beaver_ftc.control.laws.effectiveness_estimator import OBSERVER_ERROR, observer_response
 from beaver_ftc.control.laws.evidence import accumulate, derive_fading, effectiveness_seen, is_effective
+from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
+from beaver_ftc.diagnosis.types import GIVE_UP, SCALE_COMMAND, SUBTRACT_OFFSET, WAIT_FOR_SURFACE
 from beaver_ftc.loop import frame as whole
 from beaver_ftc.loop.assembly import frame_dtype
-from given import given
-from law_records import FLAP, RUDDER, put
-
-GIVEN = given(__file__)
+from law_records import ELEVATOR, FLAP, RUDDER, put
 
 DT = 0.02
 
@@ -40,7 +42,17 @@ def new_frame(stand_in):
 
 @pytest.mark.parametrize(
     ("diagnoses_all_types", "isolated", "lead", "accommodation_mode", "stand_in", "mode"),
-    GIVEN["the mode that the diagnosis asks for"],
+    [
+        (0, 5, -1, -1, FLAP, MODE_REALLOCATED), (0, 5, -1, -1, -1, MODE_ADAPTIVE),
+        (0, 6, -1, -1, FLAP, MODE_ADAPTIVE), (0, UNANTICIPATED, -1, -1, FLAP, MODE_UNANTICIPATED),
+        (1, 5, ELEVATOR, SCALE_COMMAND, FLAP, MODE_REALLOCATED),
+        (1, 5, ELEVATOR, GIVE_UP, FLAP, MODE_REALLOCATED),
+        (1, 5, ELEVATOR, SUBTRACT_OFFSET, FLAP, MODE_ADAPTIVE),
+        (1, 5, ELEVATOR, WAIT_FOR_SURFACE, FLAP, MODE_ADAPTIVE),
+        (1, 5, ELEVATOR, GIVE_UP, -1, MODE_ADAPTIVE), (1, 6, RUDDER, GIVE_UP, FLAP, MODE_ADAPTIVE),
+        (1, UNANTICIPATED, -1, -1, FLAP, MODE_UNANTICIPATED), (1, NOT_ISOLATED, -1, -1, FLAP, MODE_ADAPTIVE),
+        (1, NOT_ISOLATED, ELEVATOR, GIVE_UP, FLAP, MODE_REALLOCATED),
+    ],
 )  # fmt: skip
 def test_the_mode_that_the_diagnosis_asks_for(
     diagnoses_all_types, isolated, lead, accommodation_mode, stand_in, mode

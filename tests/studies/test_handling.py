@@ -10,6 +10,7 @@ from beaver_ftc.plant.linear import LinearModel
 from beaver_ftc.results.log import MemoryLog
 from beaver_ftc.studies.handling import (
     LIMITS,
+    WORSE,
     Limit,
     of_model,
     where_ended,
@@ -17,9 +18,6 @@ from beaver_ftc.studies.handling import (
 )
 from beaver_ftc.studies.linear_systems import CLASSICAL
 from flying import scenario
-from given import given
-
-GIVEN = given(__file__)
 
 G = 9.80665
 
@@ -63,7 +61,13 @@ def test_the_quantities_of_made_up_modes():
 
 @pytest.mark.parametrize(
     ("changed", "row", "level"),
-    GIVEN["levels as the specification has them"],
+    [
+        ({"short": (3.0, 0.14)}, 0, WORSE), ({"short": (5.0, 0.6)}, 1, 2), ({"dutch": (1.2, 0.01)}, 2, 3),
+        ({"dutch": (0.5, 0.2)}, 3, 2), ({"dutch": (0.39, 0.9)}, 4, WORSE), ({"T_roll": 3.1}, 5, 3),
+        ({"spiral": math.log(2) / 7}, 6, 3), ({"phugoid": (0.2, 0.03)}, 7, 2),
+        ({"phugoid": (0.2, -math.log(2) / 0.2 / 54)}, 8, WORSE), ({"coupled": 0.9, "spiral": -0.2}, 9, 3),
+        ({"coupled": 0.9, "spiral": -0.2}, 5, 1), ({"coupled": 0.9, "spiral": 0.1}, 6, 1),
+    ],
 )  # fmt: skip
 def test_levels_as_the_specification_has_them(changed, row, level):
     assert of_model(made_up(**changed), 40.0, "trimmed")[row].level == level

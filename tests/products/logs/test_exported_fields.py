@@ -15,10 +15,7 @@ from beaver_ftc.results.log import ParquetLog
 from beaver_ftc.results.metrics import measure
 from beaver_ftc.results.recordings import RECORDING_FILE_OF_KIND, write_recording
 from beaver_ftc_logs.readers import read_flight
-from given import given
 from results.synthetic import landed
-
-GIVEN = given(__file__)
 
 RATE_HZ, FRAMES = 24.0, 60  # of whose microseconds a third is cut or rounded
 # As many surfaces as the imported GTM has, more than the fields of one dataflash message.
@@ -87,7 +84,29 @@ _SHARES = {name: (f"{name}_cmd_rad", 1.0 / travel) for name, travel in TRAVEL_RA
 _RATES = [(f"{axis}_measured_rad_s", 1.0) for axis in "pqr"]
 _ANGLES = {"roll": "phi_rad", "pitch": "theta_rad", "yaw": "psi_rad"}
 _FLOW = ("alpha_rad", "beta_rad", "qdyn_pa", "dpt")
-RECORDED = GIVEN["recorded"]
+RECORDED = {
+    "table": {
+        **dict(zip(("p_rad_s", "q_rad_s", "r_rad_s"), _RATES, strict=True)),
+        **{f"{name}_command": share for name, share in _SHARES.items()},
+        **{f"{angle}_rad": (column, 1.0) for angle, column in _ANGLES.items()},
+        "airspeed_mps": ("airspeed_mps", 1.0),
+        **{name: (name, 1.0) for name in _FLOW},
+    },
+    "ulog": {
+        **{f"vehicle_angular_velocity.xyz[{i}]": rate for i, rate in enumerate(_RATES)},
+        **{f"actuator_servos.control[{i}]": share for i, share in enumerate(_SHARES.values())},
+        "airspeed.true_airspeed_m_s": ("airspeed_mps", 1.0),
+        **{f"attitude.{angle}_rad": (column, 1.0) for angle, column in _ANGLES.items()},
+        **{f"flow.{name}": (name, 1.0) for name in _FLOW},
+    },
+    "ardupilot": {
+        **{f"IMU.Gyr{x}": rate for x, rate in zip("XYZ", _RATES, strict=True)},
+        **{f"SRF{'CD'[i // 15]}.C{i % 15 + 1}": share for i, share in enumerate(_SHARES.values())},
+        "ARSP.Airspeed": ("airspeed_mps", 1.0),
+        **{f"ATT.{angle.title()}": (column, DEG) for angle, column in _ANGLES.items()},
+        **{f"FL{i}.V": (name, 1.0) for i, name in enumerate(_FLOW)},
+    },
+}
 
 
 @pytest.mark.parametrize("kind", RECORDING_FILE_OF_KIND)

@@ -7,9 +7,6 @@ from beaver_ftc.scenario.sweeps import load_sweep_text
 from beaver_ftc.studies.sweep.one_flight import columns_of, schema_of, table_of
 from beaver_ftc.studies.sweep.outcomes import Flights
 from beaver_ftc.studies.sweep.store import write_tables
-from given import given
-
-GIVEN = given(__file__)
 
 SWEEP = """\
 name: counted
@@ -42,7 +39,16 @@ def detected(run, delay_s, name="elevator", **metrics):
     return row(run, **(found | metrics))
 
 
-ROWS = GIVEN["rows"]  # fmt: skip
+ROWS = [
+    detected(0, 0.1), detected(1, 0.2), detected(2, 0.3, **{"detection.guaranteed_delay_s": 0.25}),
+    detected(3, 0.4, "aileron"), detected(4, 0.5, None),
+    detected(5, 0.6, **{"detection.guaranteed_delay_s": 0.7}),
+    row(6), row(7),
+    row(8, **{"false_alarm": True, "detection.detected": True, "detection.time_s": 3.0, "fault_free_s": 3.0}),
+    row(9, "departed", **{"reason": "alpha_rad at 20 s", "flown_s": 20.0, "passed": False}),
+    {**row(10, "bad_input"), **NOTHING, "reason": "no trim"},
+    row(11, **{"fault.actuator": None, "fault.type": None, "fault.at_s": None, "fault_free_s": 30.0}),
+]  # fmt: skip
 
 
 def flights_of(rows, folder: Path, text: str = SWEEP) -> Flights:

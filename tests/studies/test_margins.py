@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from beaver_ftc.control.laws import loop_design
+from beaver_ftc.control.readout import DefaultLaw
 from beaver_ftc.design.engine import slipstream
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.studies.margins import at, outputs, over_airspeeds
+from beaver_ftc.studies.margins import at, interpolated, outputs, over_airspeeds
 from beaver_ftc.studies.margins_loop import OpenLoop, frequencies, loops
 from flying import flown, scenario
 
@@ -39,6 +40,16 @@ def test_every_loop_over_the_envelope_keeps_what_is_asked(given):
     assert {each.surface for each in found} == {"aileron", "elevator", "rudder", "flap"}
     assert len({each.airspeed_mps for each in found}) == 5
     assert [each for each in found if not each.keeps(6.0, 45.0)] == []
+
+
+@pytest.mark.parametrize("handed_over", [0.0, 0.25, 1.0])
+def test_pitch_has_the_gains_of_both_surfaces_by_the_share_that_is_handed_over(handed_over):
+    tables = np.random.default_rng(0).uniform(0.1, 5.0, (3, 4, 3))
+    law = DefaultLaw(np.array([500.0, 800.0, 1200.0]), *tables, np.ones(4), 1.0)
+    at_800 = tables[:, :, 1]
+    pitch = (1.0 - handed_over) * at_800[:, 1] + handed_over * at_800[:, 3]
+    expected = np.column_stack((at_800[:, 0], pitch, at_800[:, 2]))
+    np.testing.assert_allclose(interpolated(law, 800.0, handed_over), expected, rtol=1e-12)
 
 
 def test_the_slipstream_falls_with_airspeed_as_by_its_equation():

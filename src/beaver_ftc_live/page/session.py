@@ -44,7 +44,7 @@ HIDDEN_WHOLE = ("fie_", "watch_")
 MOST_LISTED = 4  # candidates: more are counted
 
 
-def _remaining(candidates: Sequence[str], before: Sequence[str]) -> str:
+def remaining_text(candidates: Sequence[str], before: Sequence[str]) -> str:
     """The candidates, or how many there are; and those excluded since the event before."""
     few = len(candidates) <= MOST_LISTED
     said = (", ".join(candidates) or "none left") if few else f"{len(candidates)} remain"
@@ -148,7 +148,7 @@ class Session:
             self.game.named(verdict.isolated, t_s)
             self._tell("named", verdict_in_words(verdict), secret=True)
         elif verdict.detected and verdict.candidates != before[3] and not verdict.isolated:
-            self._tell("candidates", _remaining(verdict.candidates, before[3]), secret=True)
+            self._tell("candidates", remaining_text(verdict.candidates, before[3]), secret=True)
         if sim.mode != self._mode:
             self._tell("supervisor", f"{self._mode} to {sim.mode}", secret=True)
             self._mode = sim.mode

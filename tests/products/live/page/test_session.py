@@ -11,7 +11,7 @@ import beaver_ftc as bf
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_live.page import messages
 from beaver_ftc_live.page.messages import encode
-from beaver_ftc_live.page.session import Session, level_turn
+from beaver_ftc_live.page.session import Session, level_turn, remaining_text
 
 CONVERSATION = yaml.safe_load((Path(__file__).parents[3] / "data" / "conversation.yaml").read_text())
 LOSS = {"type": "loss_of_effectiveness", "actuator": "elevator", "magnitude": 0.4}
@@ -35,6 +35,20 @@ def session(tmp_path):
 
 def told(session, kind):
     return [event for event in (*session.told, *session.fresh_events) if event["kind"] == kind]
+
+
+@pytest.mark.parametrize(
+    ("left", "gone", "text"),
+    [
+        ("", "a", "none left"),
+        ("abcd", "efghij", "a, b, c, d"),
+        ("abcde", "", "5 remain"),
+        ("abcde", "fghi", "5 remain; excluded: f, g, h, i"),
+        ("abcde", "fghijk", "5 remain; excluded: f, g, h, i and 2 more"),
+    ],
+)
+def test_few_candidates_are_listed_and_many_are_counted(left, gone, text):
+    assert remaining_text(left, left + gone) == text
 
 
 def test_a_loss_is_detected_named_and_told(session):

@@ -2,20 +2,19 @@
 and what every stage remembers at the end.
 """
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.plugins import SERVICES, entries
 from beaver_ftc.results.metrics import metrics
 from beaver_ftc.scenario.schema import load
+from given import documents
 from kept import Fields, in_short, of_record
 
-_ALL = yaml.safe_load_all((Path(__file__).parent / "data" / "short_flights.yaml").read_text())
 _DERIVES = "derive" in entries(SERVICES)  # without, no aircraft of the jsbsim package flies
+_ALL = documents("short_flights")
 SCENARIOS = [one for one in _ALL if _DERIVES or not str(one.get("aircraft")).startswith("jsbsim:")]
 # Where JSBSim has its numbers: compiled code reads them there. Rounding decides whether a regressor is 0, and
 # so how often P forgets.

@@ -1,14 +1,13 @@
 """An aircraft's file: its contract, what it must not say, and what follows from it."""
 
-from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-import yaml
 from pydantic import ValidationError
 
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.aircraft.schema import AircraftFile, writing_property
+from given import documents
 from kept import keys_of
 from trainer import trainer, trainer_file
 
@@ -21,7 +20,7 @@ def terms(axis, n):
     return [{"name": f"{axis}_{i}", "value": 1.0, "of": {}} for i in range(n)]
 
 
-GIVEN = yaml.safe_load((Path(__file__).parents[1] / "data" / "aircraft_files.yaml").read_text())
+GIVEN = documents("aircraft_files")[0]
 TOO_MANY = {
     "too many": {"moments": {"Cm": terms("Cm", 65)}},
     "too many forces": {"forces": {"CZ": terms("CZ", 65)}},

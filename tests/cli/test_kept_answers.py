@@ -2,17 +2,16 @@
 
 import json
 import re
-from pathlib import Path
 
 import pytest
-import yaml
 from matplotlib.figure import Figure
 
 from commands import beaver
 from drawn_figures import shown
+from given import documents
 from kept import page
 
-GIVEN = yaml.safe_load((Path(__file__).parents[1] / "data" / "answers.yaml").read_text())
+GIVEN = documents("answers")[0]
 KEPT = (".acmi", ".html", ".json", ".md", ".xml", ".yaml")
 # What hangs on the day, the machine and the code, and what pages have to look well.
 APART = re.compile(

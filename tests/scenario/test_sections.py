@@ -1,13 +1,10 @@
 """Sections against each other: what is said of contradictions and of what is unwise, right at each bound."""
 
-from pathlib import Path
-
 import pytest
-import yaml
 
 from beaver_ftc.documents.report import ScenarioError
 from beaver_ftc.scenario.schema import load, load_text
-from given import given
+from given import documents, given
 
 GIVEN = given(__file__)
 
@@ -44,5 +41,5 @@ def test_what_contradictions_are_called(changed):
 
 
 def test_what_is_unwise_is_said_at_the_bound_and_not_before(changed):
-    given = yaml.safe_load((Path(__file__).parents[1] / "data" / "unwise.yaml").read_text())
-    assert not changed({case: load({"name": "x", **keys}).warnings() for case, keys in given.items()})
+    cases = documents("unwise")[0].items()
+    assert not changed({case: load({"name": "x", **keys}).warnings() for case, keys in cases})

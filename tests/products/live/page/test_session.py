@@ -1,19 +1,18 @@
 """The flight behind the page: it breaks, is diagnosed, saved, and flies again to the bit."""
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
-import yaml
 
 import beaver_ftc as bf
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_live.page import messages
 from beaver_ftc_live.page.messages import encode
 from beaver_ftc_live.page.session import Session, level_turn, remaining_text
+from given import documents
 
-CONVERSATION = yaml.safe_load((Path(__file__).parents[3] / "data" / "conversation.yaml").read_text())
+CONVERSATION = documents("conversation")[0]
 LOSS = {"type": "loss_of_effectiveness", "actuator": "elevator", "magnitude": 0.4}
 
 

@@ -65,6 +65,11 @@ def test_an_error_is_at_its_limit_and_its_sign_does_not_depend_on_the_factor():
     assert abs(sensors.alpha.bias_deg) == pytest.approx(0.2)
 
 
+def test_an_error_of_several_axes_says_its_largest_size():
+    says = {error.name: error.says for error in errors_of(DECLARED)}
+    assert (says["inertia coupling"], says["unstructured acceleration"]) == ("0.2", "0.03 rad/s2")
+
+
 def test_what_is_not_declared_is_flown_alone_in_units_of_its_own():
     scenario = bf.load(SHORT)  # the published bounds alone
     errors = errors_of(scenario)

@@ -1,5 +1,8 @@
 """Compiled property access gives what Python gives, to the bit."""
 
+import sys
+
+import jsbsim
 import numpy as np
 import pytest
 
@@ -20,7 +23,17 @@ READ = [
 ]
 WRITTEN = ["fcs/aileron-cmd-rad", "fcs/elevator-cmd-rad", "fcs/rudder-cmd-rad", "failures/flap/effectiveness"]
 
+KNOWN = (
+    "1.3.3",
+    "linux",
+)  # a build whose layout must be found: without, flights take longer
+
 needs_native = pytest.mark.skipif(not addresses.available(), reason="this build of JSBSim has another layout")
+
+
+@pytest.mark.skipif((jsbsim.__version__, sys.platform) != KNOWN, reason="another build than the known one")
+def test_the_layout_of_the_known_build_is_proved():
+    assert addresses.is_proved(addresses.LAYOUT)
 
 
 @needs_native

@@ -81,15 +81,11 @@ def with_aircraft(scenario: Scenario, reference: str) -> Scenario:
     errors and declared servo errors belong to the first aircraft and are left out. A folder is looked for in
     the working directory."""
     find_aircraft(reference, Path())
-    given = {"aircraft": reference, "initial": {}, "uncertainty": {}, "actuators": "ideal"}
-    document = _without_faults(scenario)
+    given: Document = {"aircraft": reference, "initial": {}, "uncertainty": {}, "actuators": "ideal"}
+    given |= {"faults": [], "expect": {}}
+    document = scenario.model_dump(mode="json", exclude_none=True)
     del document["fdi"]["bounds"]["actuators"]
     return Scenario.model_validate(document | given)
-
-
-def _without_faults(scenario: Scenario) -> Document:
-    """The keys of a scenario without faults and expectations."""
-    return {**scenario.model_dump(mode="json", exclude_none=True), "faults": [], "expect": {}}
 
 
 def rows_at_place(scenario: Scenario, point: tuple[float, float, float]) -> dict[str, list[Document]]:
@@ -117,12 +113,10 @@ def rows_at_place(scenario: Scenario, point: tuple[float, float, float]) -> dict
 
 def at(scenario: Scenario, speed_mps: float, altitude_m: float, excitation: float) -> Scenario:
     """The scenario at another airspeed and altitude, with its references times `excitation`."""
-    document = _without_faults(scenario)
-    document["initial"] |= {"airspeed_mps": speed_mps, "altitude_m": altitude_m}
-    document["reference"] = {
-        axis: scaled(signals, AMPLITUDES, excitation) for axis, signals in document["reference"].items()
-    }
-    return Scenario.model_validate(document)
+    signals = scenario.model_dump(mode="json", exclude_none=True)["reference"]
+    reference = {axis: scaled(of_axis, AMPLITUDES, excitation) for axis, of_axis in signals.items()}
+    place = {"initial.airspeed_mps": speed_mps, "initial.altitude_m": altitude_m}
+    return scenario.with_({"faults": [], "expect": {}, "reference": reference, **place})
 
 
 def scaled(signals: Sequence[Document], keys: Collection[str], times: float) -> list[Document]:

@@ -59,7 +59,9 @@ def errors_of(scenario: Scenario) -> tuple[Error, ...]:
     declaration."""
     bounds = scenario.fdi.bounds
     declared = Declared.of(scenario)
-    shares = {term.name: declared.coefficients.of(term.name) for term in scenario.airframe.moments}
+    airframe = scenario.airframe
+    names = [term.name for term in airframe.moments if term.name in airframe.terms]
+    shares = {name: declared.coefficients.of(name) for name in names}
     inertia = dict.fromkeys(("Ix", "Iy", "Iz"), bounds.inertia)
     constant = declared.constant_rad_s2
     errors = (

@@ -38,7 +38,7 @@ HYPOTHESIS_RECORD = record(
     signature=2,  # s of this frame, rad/s2 per unit of theta
     decay=float,  # exp(-kappa dt) of a growing loss
     score=float,  # largest normalised evidence over the onsets, standard deviations
-    th=float, D=float,  # estimate at the likeliest onset; one over its variance
+    th=float, D=float,  # of a LOSS: estimate at the likeliest onset; one over its variance
     llr_lo=float, llr_hi=float,  # bounds on the log-likelihood ratio against no fault
 )  # fmt: skip
 
@@ -87,8 +87,9 @@ def block_dtype(size: BlockCapacity) -> np.dtype:
         has_coarse=int, g_c=2, x_c=4,  # whether vanes show a gust coarsely; state of its filter
         # alarm level, standard deviations; share of it reserved for noise beyond a bounded uncertainty
         alarm_level=float, noise_share=float, eta_rate=float, eta_0=2, eta_r=2,
-        # regressors: number in use, columns of Z in rows.py, tolerances; values, states and responses
-        n_Z=int, columns=(int, size.max_regressors), tol=size.max_regressors,
+        # regressors: number in use; of these the first n_columns are columns of Z in rows.py, one more is the
+        # leak of a view; tolerances; values, states and responses
+        n_Z=int, n_columns=int, columns=(int, size.max_regressors), tol=size.max_regressors,
         regressor=(size.max_regressors, 2), x_Z=(size.max_regressors, 4), g_Z=(size.max_regressors, 2),
         n_h=int, hypothesis=(HYPOTHESIS_RECORD, size.max_hypotheses),
         tests=(TESTS_RECORD, n_groups),
@@ -104,7 +105,9 @@ def new_filter_block(P: np.ndarray, R: np.ndarray) -> np.ndarray:
     """
     blocks = np.zeros(1, block_dtype(BlockCapacity(1, 1)))
     n = len(R)
-    b, x, d = blocks[0], slice(0, n), slice(n, 2 * n)
+    b = blocks[0]
+    x = slice(0, n)
+    d = slice(n, 2 * n)
     b["n"], b["axes"], b["R_y"][:n] = n, (0, 1), R
     for name, i, j in (("P_xx", x, x), ("P_xd", x, d), ("P_dd", d, d)):
         b[name][:n, :n] = P[i, j]

@@ -41,31 +41,32 @@ def eta_rate(settings: Statistical, aircraft: Aircraft, dt_s: float) -> float:
 def configure_noise(
     stat: np.void, omega: float, declared: Declared, model: np.void, trim: TrimState, dt_s: float
 ) -> None:
-    """Fill the drift, for an uncertainty of frequency omega, rad/s, and the model noise by noise of f + G u.
+    """Fill the noise model in trim, for an uncertainty of frequency omega, rad/s:
 
-    The evidence that the uncertainty explains is bounded by its declared rate of change in any case
-    (`likelihood.uncertain_share`). The drift only sets how much of it the filters remove. If damage may take
-    surfaces, a weaker drift detects most: motion that no loss explains is then rarely an error of the model.
+        G_trim    |G|, rad/s2 per rad
+        Q0        sum_x (F_x sigma_x)^2, (rad/s2)2, by the noise of the gyros
+        Q         Q0 + sum_y (F_y sigma_y)^2; `rates.add_constants` updates it in flight, and adds the noise
+                  of the engine's power
+        rate0     omega dt
+        q         `derive_intensity` at omega, 1/s; if damage may take surfaces, at DAMAGE_FREQUENCY_RAD_S at
+                  most
 
-        Q0 = sum_x (F_x sigma_x)^2      Q = Q0 + sum_y (F_y sigma_y)^2, in trim
+    F_x, F_y: slopes of f + G u with rates x and air data y; sigma: noise of the readings, gyros first.
 
-    In flight `rates.add_constants` updates Q, and adds the noise of the engine's power.
-
-    F_x, F_y: slopes of f + G u with rates x and air data y; sigma: noise of the readings, gyros first. Also
-    fill rate0, and G_trim, the magnitude of G in trim.
+    q only sets how much of the uncertainty the filters remove: `likelihood.uncertain_share` bounds in any
+    case the evidence that it explains. If damage may take surfaces, a weaker drift detects most, because
+    motion that no loss explains is then rarely an error of the model.
     """
-    sigma = declared.sensors.each("random")
-    noise = stat["noise"]
-    noise["rate0"] = omega * dt_s
-    if declared.aircraft.loses_surfaces:
-        omega = min(DAMAGE_FREQUENCY_RAD_S, omega)
-    eta = max(declared.constant_rad_s2)
-    level = float(stat["test"]["alarm_level"])
     _, G, F_x, F_y = jacobian(model, *trim)
+    sigma = declared.sensors.each("random")
     Q0 = F_x**2 @ sigma[:Y0] ** 2
     Q_y = F_y[:, [ALPHA, BETA, AIRSPEED, QDYN]] ** 2 @ sigma[Y0:] ** 2
-    fill(noise, q=derive_intensity(eta, omega, float(sigma[:Y0].max()), level, dt_s), Q0=Q0, Q=Q0 + Q_y)
-    noise["G_trim"][:, : G.shape[1]] = np.abs(G)
+    omega_q = min(DAMAGE_FREQUENCY_RAD_S, omega) if declared.aircraft.loses_surfaces else omega
+    b = max(declared.constant_rad_s2)
+    z = float(stat["test"]["alarm_level"])
+    q = derive_intensity(b, omega_q, float(sigma[:Y0].max()), z, dt_s)
+    fill(stat["noise"], rate0=omega * dt_s, q=q, Q0=Q0, Q=Q0 + Q_y)
+    stat["noise"]["G_trim"][:, : G.shape[1]] = np.abs(G)
 
 
 def derive_intensity(b: float, omega: float, sigma: float, z: float, dt_s: float) -> float:

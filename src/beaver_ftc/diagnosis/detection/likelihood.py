@@ -83,8 +83,9 @@ def reset_slot(b, slot):
         t = b.tests[group]
         for k in range(slot, tests_in_group(b, group), N_SLOTS):
             t.left[k] = 1.0
+            t.x_s[:, k] = t.w[:, k] = 0.0
             t.N[k] = t.D[k] = t.N_p[k] = t.N_c[k] = 0.0
-            t.e_0[k] = t.e_tv[k] = t.e_w[k] = t.w[:, k] = t.x_s[:, k] = b.R[group, : b.n_Z, k] = 0.0
+            t.e_0[k] = t.e_tv[k] = t.e_w[k] = b.R[group, : b.n_Z, k] = 0.0
 
 
 @kernel
@@ -152,7 +153,8 @@ def accumulate_tests(b, t, n, dt, decay):
             x[D0 + i, k] *= a
     for i in range(b.n):
         for j in range(b.n):
-            K_x, K_d = b.K_x[i, j], b.K_d[i, j]
+            K_x = b.K_x[i, j]
+            K_d = b.K_d[i, j]
             for k in range(n):
                 x[i, k] -= K_x * g_s[j, k]
                 x[D0 + i, k] += K_d * g_s[j, k]
@@ -274,10 +276,11 @@ def evaluate_tests(b, t, n, without_eta, mapped):
     r0 = b.eta_r[0]
     r1 = b.eta_r[1]
     for k in range(n):
-        N, D, sign = t.N[k], t.D[k], t.sign[k]
+        D = t.D[k]
+        sign = t.sign[k]
         signed = sign != 0.0
         known = D > 0.0
-        N_s = sign * N if signed else abs(N)
+        N_s = sign * t.N[k] if signed else abs(t.N[k])
         e = t.e_R[k] + max(sign * t.N_p[k], 0.0) + max(sign * t.N_c[k], 0.0)
         room = uncertain_share(t, k, r0, r1)
         score = evidence_ratio(z, share, N_s - e, room, D)
@@ -293,11 +296,13 @@ def evaluate_tests(b, t, n, without_eta, mapped):
 
 @kernel
 def evaluate_hypotheses(b, decay, mapped):
-    """Fill the score, the estimate and the bounds on the log-likelihood ratio of each hypothesis.
+    """Fill the score and the bounds on the log-likelihood ratio of each hypothesis, the largest over its
+    onsets, and of a loss the most likely theta in [-1, 0], at its likeliest onset, and D there:
 
-    Score and bounds are the largest over its onsets; the estimate is that of the likeliest onset. decay: if a
-    loss may end, the factor by which earlier upper bounds decay and still count, and the bounds leave out the
-    room; else 0. mapped: see `evaluate_tests`.
+        th = (N - LOSS_PRIOR / 2) / (D + LOSS_PRIOR)    prior: mean -1/2 and variance of a uniform theta
+
+    decay: if a loss may end, the factor by which earlier upper bounds decay and still count, and the bounds
+    leave out the room; else 0. mapped: see `evaluate_tests`.
     """
     for i in range(n_test_groups(b.n_h)):
         evaluate_tests(b, b.tests[i], tests_in_group(b, i), decay > 0.0, mapped)
@@ -305,15 +310,18 @@ def evaluate_hypotheses(b, decay, mapped):
         t = b.tests[h // GROUP_SIZE]
         first = (h % GROUP_SIZE) * N_SLOTS
         k_best = first
-        hyp.score, hyp.llr_lo, hyp.llr_hi = 0.0, 0.0, decay * hyp.llr_hi
+        hyp.score = hyp.llr_lo = 0.0
+        hyp.llr_hi *= decay
         for k in range(first, first + N_SLOTS):
             hyp.score = max(hyp.score, t.score[k])
-            hyp.llr_lo, hyp.llr_hi = max(hyp.llr_lo, t.llr_lo[k]), max(hyp.llr_hi, t.llr_hi[k])
+            hyp.llr_lo = max(hyp.llr_lo, t.llr_lo[k])
+            hyp.llr_hi = max(hyp.llr_hi, t.llr_hi[k])
             if t.llr[k] > t.llr[k_best]:
                 k_best = k
-        if t.llr[k_best] > -1.0:
-            N, hyp.D = t.N[k_best], t.D[k_best]
-            hyp.th = estimate_theta(hyp.kind, N, hyp.D)
+        if hyp.kind == LOSS and t.llr[k_best] > -1.0:
+            hyp.D = t.D[k_best]
+            th = (t.N[k_best] - 0.5 * LOSS_PRIOR) / (hyp.D + LOSS_PRIOR)
+            hyp.th = min(max(th, -1.0), 0.0)
 
 
 @kernel
@@ -336,16 +344,3 @@ def update_block(b, dt, decay, hi_decay=0.0, mapped=False):
         whiten_step(b, b.x_Z[j], b.regressor[j], dt, b.g_Z[j])
     accumulate_evidence(b, dt, decay)
     evaluate_hypotheses(b, hi_decay, mapped)
-
-
-@kernel
-def estimate_theta(kind, N, D):
-    """The most likely theta: N / D; of a loss, its growth or its end, in [-1, 0], with the mean and variance
-    of a uniform one as prior:
-
-    th = (N - LOSS_PRIOR / 2) / (D + LOSS_PRIOR)
-    """
-    if kind not in (LOSS, GROWING_LOSS, LOSS_END):
-        return N / D
-    th = (N - 0.5 * LOSS_PRIOR) / (D + LOSS_PRIOR)
-    return min(max(th, -1.0), 0.0)

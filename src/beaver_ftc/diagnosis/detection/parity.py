@@ -142,14 +142,19 @@ def turn_view(view, rows, gust):
     m = view.block.m[0]
     col = view.col
     c = view.nulled
-    i, k, j = view.places[0], view.places[1], view.places[2]
-    L, C = gust.output.rate_damping, gust.output.C
+    i = view.places[0]
+    k = view.places[1]
+    j = view.places[2]
+    L = gust.output.rate_damping
+    C = gust.output.C
     g_i = rows.G[c, i]
     g_j = rows.G[c, j]
     g_k = rows.G[c, k] if k >= 0 else 0.0
     q_i = project_gust(L[i], C, ROLL) if k >= 0 else 0.0
     q_k = project_gust(L[k], C, ROLL) if k >= 0 else 1.0
-    m_i, m_k, m_j = -g_j * q_k, g_j * q_i, g_i * q_k - g_k * q_i
+    m_i = -g_j * q_k
+    m_k = g_j * q_i
+    m_j = g_i * q_k - g_k * q_i
     norm = np.sqrt(g_i * g_i + g_k * g_k + g_j * g_j)
     norm_m = np.sqrt(m_i * m_i + m_k * m_k + m_j * m_j)
     if norm_m == 0.0:
@@ -203,12 +208,12 @@ def project_view(view, stat, vaned, V):
     The order matters: the direction is turned before the rows are projected on it.
     """
     b = view.block
-    rows, forces = stat.rows, stat.forces
+    rows = stat.rows
+    forces = stat.forces
     air = stat.gust if b.source == RAW else vaned
-    is_across = view.nulled != AXIS_VIEW
-    leak = turn_view(view, rows, air) if is_across else 0.0
+    leak = turn_view(view, rows, air) if view.nulled != AXIS_VIEW else 0.0
     project_rows(b, rows)
-    if is_across and b.n_Z > 0:
+    if b.n_Z > b.n_columns:
         fill_leak(b, rows, leak, view.col)
     source_gust = stat.vaneless if b.source >= VANELESS and forces.in_use else air
     fill_view_drift(view, stat.noise.q, air, source_gust, forces, V)
@@ -224,7 +229,9 @@ def update_views(stat, vaned, y, dt, k, latched):
     latched: the detector has raised its alarm, so evidence decays and no slot restarts. A view that sees a
     force is used only while the forces are.
     """
-    cfg, c, forces = stat.test, stat.tone_test_config, stat.forces
+    cfg = stat.test
+    c = stat.tone_test_config
+    forces = stat.forces
     inside = within_limits(c, y)
     decay = cfg.forget if latched else 1.0
     slot = restarting_slot(k)

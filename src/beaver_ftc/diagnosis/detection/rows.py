@@ -67,8 +67,10 @@ ROWS_RECORD = record(
 
 def set_columns(b: np.void, rows: np.void, columns: list[int]) -> None:
     """Fill which columns of Z a block sees, and their tolerances."""
-    b["n_Z"], b["columns"][: len(columns)] = len(columns), columns
-    b["tol"][: len(columns)] = rows["tol"][columns]
+    n = len(columns)
+    b["n_Z"] = b["n_columns"] = n
+    b["columns"][:n] = columns
+    b["tol"][:n] = rows["tol"][columns]
 
 
 @kernel
@@ -94,7 +96,7 @@ def project_rows(b, rows):
                 h.signature[i] = project(m, rows.Gu[h.surface])
             elif h.kind == ALPHA_CUBED_MOMENT:
                 h.signature[i] = m[PITCH] * rows.per_cubed
-        for j in range(b.n_Z):
+        for j in range(b.n_columns):
             b.regressor[j, i] = project(m, rows.Z[b.columns[j]])
 
 

@@ -94,9 +94,11 @@ def supervise(supervisor, wanted, informed, t):
     mode = MODE_ADAPTIVE if nominal and wanted != MODE_NOMINAL else wanted
     if mode != supervisor.mode or supervisor.n_modes == 0:
         last = min(supervisor.n_modes, MAX_EVENTS - 1)  # once the record is full, its last place
-        supervisor.mode_at_s[last], supervisor.mode_is[last] = t, mode
+        supervisor.mode_at_s[last] = t
+        supervisor.mode_is[last] = mode
         supervisor.n_modes += 1
-    supervisor.mode, supervisor.informed = mode, informed
+    supervisor.mode = mode
+    supervisor.informed = informed
 
 
 # effectiveness_step: its largest change in a frame; least_effectiveness: the smallest that a law divides by.
@@ -138,7 +140,9 @@ def configure(surfaces: np.void, config: ControlConfig, informed: bool, dt_s: fl
 def accommodate(control, assessment, faults, prediction, measured):
     """Bring the estimates of all surfaces and of the unknown acceleration to this frame
     (control.CompiledLaw)."""
-    surfaces, output, informed = control.surfaces, control.surfaces.output, control.config.informed
+    surfaces = control.surfaces
+    output = control.surfaces.output
+    informed = control.config.informed
     begin_frame(output, assessment.lags and not informed)
     if informed:
         follow_truth(surfaces, faults, prediction.u)
@@ -152,7 +156,9 @@ def accommodate(control, assessment, faults, prediction, measured):
 @kernel
 def begin_frame(output, authority_lost):
     """Begin a frame with no surface given up or parked yet; authority_lost: whether a surface is slow."""
-    output.given_up[:], output.parked[:], output.authority_lost = 0, 0, authority_lost
+    output.given_up[:] = 0
+    output.parked[:] = 0
+    output.authority_lost = authority_lost
 
 
 @kernel
@@ -171,7 +177,8 @@ def follow_truth(surfaces, faults, u):
     delta, u (n,) rad: effective deflections, and those of healthy surfaces.
     """
     output = surfaces.output
-    output.offset[:], output.lag[:] = 0.0, 0.0
+    output.offset[:] = 0.0
+    output.lag[:] = 0.0
     for s in range(u.size):
         E = 0.0 if faults.immovable[s] else faults.effectiveness[s]
         approach(surfaces, s, output.effectiveness[s], E)
@@ -189,7 +196,8 @@ def start_of(output, assessment, s):
 @kernel
 def approach(surfaces, s, start, target):
     """Move the effectiveness of surface s from `start` towards `target` by at most the step of a frame."""
-    output, step = surfaces.output, surfaces.config.effectiveness_step
+    output = surfaces.output
+    step = surfaces.config.effectiveness_step
     output.target[s] = target
     output.effectiveness[s] = start + clamp(target - start, step)
 
@@ -197,7 +205,9 @@ def approach(surfaces, s, start, target):
 @kernel
 def give_up(output, s):
     """Give up surface s: its effectiveness is 0 at once, without the limit on a step."""
-    output.given_up[s], output.target[s], output.effectiveness[s] = 1, 0.0, 0.0
+    output.given_up[s] = 1
+    output.target[s] = 0.0
+    output.effectiveness[s] = 0.0
 
 
 @kernel

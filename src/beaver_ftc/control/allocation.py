@@ -79,7 +79,8 @@ def allocation_dtype(n: int) -> np.dtype:
 def configure(control: np.void, declared: Declared, travel: np.ndarray) -> None:
     """Fill `layout`, except its trim (loop/assembly.py), and `allocation` of a law's record; travel (2, n)
     rad."""
-    layout, aircraft = control["layout"], declared.aircraft
+    layout = control["layout"]
+    aircraft = declared.aircraft
     fill(
         layout, low=travel[0], high=travel[1], main=main_surface_index_by_axis(aircraft),
         stand_in=aircraft.surfaces.index(aircraft.stand_ins[0]) if aircraft.stand_ins else -1,
@@ -122,7 +123,9 @@ def divide(moment, divisor):
 def set_demand(axes, i, demand, hold, disturbance):
     """Set what a law demands about axis i, the part that only holds the rates, and the disturbance that its
     observer finds, rad/s2."""
-    axes.demand[i], axes.hold[i], axes.disturbance[i] = demand, hold, disturbance
+    axes.demand[i] = demand
+    axes.hold[i] = hold
+    axes.disturbance[i] = disturbance
 
 
 @kernel
@@ -157,9 +160,12 @@ def lateral(axes, output, layout):
     it can. The order is therefore a, r, a: r is computed with the a that the stops allow, and a again with
     the r that they allow.
     """
-    G, u = axes.G, output.command
-    a, r = layout.main[ROLL], layout.main[YAW]
-    roll, yaw = axes.demand[ROLL], axes.demand[YAW]
+    G = axes.G
+    u = output.command
+    a = layout.main[ROLL]
+    r = layout.main[YAW]
+    roll = axes.demand[ROLL]
+    yaw = axes.demand[YAW]
     determinant = G[ROLL, a] * G[YAW, r] - G[ROLL, r] * G[YAW, a]
     u[a] = clip(output, layout, a, divide(roll * G[YAW, r] - yaw * G[ROLL, r], determinant))
     u[r] = clip(output, layout, r, divide(yaw - G[YAW, a] * u[a], G[YAW, r]))
@@ -188,8 +194,11 @@ def pitch(axes, output, layout, effectiveness, share, probe):
     An elevator that is given up (G_e = 0) leaves the flap the whole demand. G_e, G_f: of pitch, rad/s2 per
     rad, with the effectiveness of each surface in it; effectiveness: of the elevator; probe: rad of the flap.
     """
-    G, u, demand = axes.G, output.command, axes.demand[PITCH]
-    e, f = layout.main[PITCH], layout.stand_in
+    G = axes.G
+    u = output.command
+    demand = axes.demand[PITCH]
+    e = layout.main[PITCH]
+    f = layout.stand_in
     if f >= 0:
         trimmed = divide(G[PITCH, e], effectiveness) * layout.trim[e]
         flap = layout.trim[f] + share * (divide(demand - trimmed, G[PITCH, f]) - layout.trim[f])
@@ -215,8 +224,10 @@ def spill_to_flap(axes, output, layout):
     If the elevator is jammed or too weak, the observer of the law finds what it does not do, and the law
     demands more than it can give. The flap need not wait until the fault is named.
     """
-    G, u = axes.G, output.command
-    e, f = layout.main[PITCH], layout.stand_in
+    G = axes.G
+    u = output.command
+    e = layout.main[PITCH]
+    f = layout.stand_in
     if f >= 0 and output.saturated[e]:
         shortfall = axes.demand[PITCH] - G[PITCH, e] * u[e]
         u[f] = clip(output, layout, f, divide(shortfall, G[PITCH, f]))
@@ -227,7 +238,8 @@ def park(output, layout, parked):
     """Command each surface that is `parked` (n,) to its trim."""
     for s in range(layout.trim.size):
         if parked[s]:
-            output.command[s], output.saturated[s] = layout.trim[s], 0
+            output.command[s] = layout.trim[s]
+            output.saturated[s] = 0
 
 
 @kernel
@@ -255,7 +267,8 @@ def hand_over_pitch(allocation, reallocated, at_once, remains, least):
     of the authority in pitch (`authority.remaining`). Else lost_share stays while pitch is handed back: the
     estimate of the main surface may return to 1 in one frame, but the command must not jump.
     """
-    output, step = allocation.output, allocation.config.hand_over_step
+    output = allocation.output
+    step = allocation.config.hand_over_step
     output.hand_over = min(max(output.hand_over + (step if reallocated else -step), 0.0), 1.0)
     if reallocated and at_once:
         output.hand_over = max(output.hand_over, 1.0 - remains)

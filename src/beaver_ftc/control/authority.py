@@ -25,7 +25,8 @@ def authority_shares(declared: Declared, layout: np.void) -> np.ndarray:
     The surface that leads the axis has the share 1 if the aircraft is not general, or if no surface has its
     largest effect about the axis. Backups have none in pitch.
     """
-    aircraft, main = declared.aircraft, layout["main"]
+    aircraft = declared.aircraft
+    main = layout["main"]
     shares = np.zeros((3, aircraft.n))
     if layout["general"]:
         effects = aircraft.effects(declared.scale)
@@ -55,7 +56,8 @@ def attainable(G, layout, by_engines, i):
     """
     least, greatest = by_engines[0, i], by_engines[1, i]
     for s in range(layout.low.size):
-        at_low, at_high = G[i, s] * layout.low[s], G[i, s] * layout.high[s]
+        at_low = G[i, s] * layout.low[s]
+        at_high = G[i, s] * layout.high[s]
         least += min(at_low, at_high)
         greatest += max(at_low, at_high)
     return least, greatest

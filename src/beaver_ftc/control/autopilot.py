@@ -61,9 +61,15 @@ def steer(ap, control, u, measured, unexplained, t):
     gamma_c, rad; rolling, pitching: phi_c', theta_c', rad/s. The order matters: each step reads the limits of
     the steps before.
     """
-    layout, surfaces, saturated = control.layout, control.surfaces, control.allocation.output.saturated
-    axes, power, by_engines = control.axes, control.power, control.engines.output.authority
-    y, attitude, rudder = measured.y, measured.attitude, layout.main[YAW]
+    layout = control.layout
+    surfaces = control.surfaces
+    saturated = control.allocation.output.saturated
+    axes = control.axes
+    power = control.power
+    by_engines = control.engines.output.authority
+    y = measured.y
+    attitude = measured.attitude
+    rudder = layout.main[YAW]
     if not ap.flying:
         take_over(ap, y, attitude)
     advance_commands(ap, (measured.altitude, y[AIRSPEED], attitude[YAW], attitude[ROLL]), t)
@@ -84,7 +90,8 @@ def steer(ap, control, u, measured, unexplained, t):
 @kernel
 def take_over(ap, y, attitude):
     """Take over in trim: the smoothed signals begin as measured, and the path angle is gamma_trim."""
-    ap.flying, ap.alpha = 1, y[ALPHA]
+    ap.flying = 1
+    ap.alpha = y[ALPHA]
     ap.airspeed = ap.recent_airspeed_mps = y[AIRSPEED]
     ap.climb_in_trim = attitude[PITCH] - y[ALPHA]
 
@@ -116,8 +123,11 @@ def smooth_signals_and_losses(ap, layout, surfaces, saturated, engines_yaw, y):
     At its stop a surface gives no more, whatever its estimated effectiveness. engines_yaw: whether engines
     can yaw the aircraft; the last share stays if not.
     """
-    dt, gain, main = ap.dt, ap.gain, layout.main
-    effectiveness, least = surfaces.output.effectiveness, surfaces.config.least_effectiveness
+    dt = ap.dt
+    gain = ap.gain
+    main = layout.main
+    effectiveness = surfaces.output.effectiveness
+    least = surfaces.config.least_effectiveness
     ap.alpha += dt / gain.alpha_s * (y[ALPHA] - ap.alpha)
     ap.airspeed += dt / gain.airspeed_s * (y[AIRSPEED] - ap.airspeed)
     if ap.sets_power:
@@ -145,7 +155,9 @@ def limit_rates_and_bank(ap, layout, G, hold, by_engines):
     G (3, n): with the effectiveness of each in it; hold (3,) rad/s2; least, greatest, by_engines: as in
     `authority.attainable`.
     """
-    rate, gain, roll_loss = ap.rate_limit, ap.gain, ap.roll_loss_share
+    rate = ap.rate_limit
+    gain = ap.gain
+    roll_loss = ap.roll_loss_share
     for i in range(3):
         least, greatest = attainable(G, layout, by_engines, i)
         spare = max(min(greatest - hold[i], hold[i] - least), 0.0)
@@ -167,9 +179,12 @@ def set_body_rates(ap, y, attitude, rolling, pitching):
     are lost; phi' / (dihedral V) within MOST_SIDESLIP_RAD. If neither heading nor bank is commanded, psi' and
     r are 0. r stays within its limit.
     """
-    sin_roll, cos_roll = np.sin(attitude[ROLL]), np.cos(attitude[ROLL])
-    sin_pitch, cos_pitch = np.sin(attitude[PITCH]), np.cos(attitude[PITCH])
-    turning, yawing = 0.0, 0.0
+    sin_roll = np.sin(attitude[ROLL])
+    cos_roll = np.cos(attitude[ROLL])
+    sin_pitch = np.sin(attitude[PITCH])
+    cos_pitch = np.cos(attitude[PITCH])
+    turning = 0.0
+    yawing = 0.0
     if ap.is_commanded[HEADING] or ap.is_commanded[BANK]:
         turning = ap.gravity / ap.airspeed * sin_roll / max(cos_roll, LEAST_COS_BANK)
         sideslip = -rolling / (ap.dihedral * ap.airspeed)

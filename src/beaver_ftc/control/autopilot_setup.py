@@ -140,12 +140,15 @@ def _set_up_aircraft_values(autopilot: np.void, declared: Declared) -> None:
     S m2: wing area; m kg: mass; b m: span. A model without Cl_p has -1 for it. dpt3 is at least 0, and
     infinite without Cn_dpt3.
     """
-    aircraft, terms, mass_kg = declared.aircraft, declared.terms, declared.mass.mass_kg
+    aircraft = declared.aircraft
+    terms = declared.terms
+    mass_kg = declared.mass.mass_kg
     S_per_m = aircraft.geometry.wing_area_m2 / mass_kg
     if aircraft.airspeed_by == "power" and THRUST_TERM not in terms:
         set_up_engine(autopilot["engine"], aircraft.engine.thrust, mass_kg)
     roll_ratio = terms.get("Cl_beta", 0.0) / (terms.get("Cl_p") or -1.0)
-    dpt3, beta = inf, POWER_SIDESLIP_RAD
+    dpt3 = inf
+    beta = POWER_SIDESLIP_RAD
     if terms.get("Cn_dpt3"):
         Cn_held = terms.get("Cn_beta", 0.0) * beta + terms.get("Cn_beta3", 0.0) * beta**3
         dpt3 = max(Cn_held / abs(terms["Cn_dpt3"]), 0.0)

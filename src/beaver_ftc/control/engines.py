@@ -55,8 +55,11 @@ ENGINES = record(config=ENGINES_CONFIG, memory=ENGINES_MEMORY, output=ENGINES_OU
 def configure_engines(engines: np.void, declared: Declared) -> None:
     """Fill the record (dtype ENGINES); it stays empty where no engine is an effector, none may be used, or
     the aircraft's file has no setting of power."""
-    aircraft, dt, config = declared.aircraft, 1.0 / declared.rate_hz, engines["config"]
-    name_and_setting, thrust = aircraft.file.power_setting, aircraft.engine.thrust
+    aircraft = declared.aircraft
+    dt = 1.0 / declared.rate_hz
+    config = engines["config"]
+    name_and_setting = aircraft.file.power_setting
+    thrust = aircraft.engine.thrust
     may_use = row_of(declared.control.law).uses_verdict and declared.control.power.enabled
     if not aircraft.effectors or not may_use or name_and_setting is None:
         return
@@ -66,11 +69,13 @@ def configure_engines(engines: np.void, declared: Declared) -> None:
         config, n=len(aircraft.effectors), low=low, high=high, step=(high - low) / WHOLE_RANGE_S * dt,
         integral_gain=dt / T, release=dt / RELEASE_S,
     )  # fmt: skip
-    mass, inertia = declared.mass, inertia_coefficients(declared.mass)
+    mass = declared.mass
+    inertia = inertia_coefficients(declared.mass)
     set_up_engine(engines["memory"]["thrust"], thrust, mass.mass_kg)
     for k, engine in enumerate(aircraft.effectors.values()):
         force_n = engine.share * mass.mass_kg
-        pitching, yawing = engine.down_m * force_n, -engine.right_m * force_n
+        pitching = engine.down_m * force_n
+        yawing = -engine.right_m * force_n
         config["B"][:, k] = inertia.Pn * yawing, inertia.Qm * pitching, inertia.Rn * yawing
         engines["memory"]["problem"]["weight"][k] = 1.0
 
@@ -119,12 +124,14 @@ def limit(config, memory, authority, base):
     The limits up and down are equal. To yaw, two engines on opposite sides then give opposite u, also at
     their limits, and the sum of the thrust, which holds the airspeed, stays.
     """
-    problem, table = memory.problem, memory.thrust
+    problem = memory.problem
+    table = memory.thrust
     authority[:] = 0.0
     # 0.0 is the push (thrust.py), which is not used: an aircraft with such engines has a table
     u_max = min(gained(table, 0.0, base, config.high), -gained(table, 0.0, base, config.low))
     for k in range(config.n):
-        problem.low[k], problem.high[k] = -u_max, u_max
+        problem.low[k] = -u_max
+        problem.high[k] = u_max
         for i in (PITCH, YAW):
             reach = abs(config.B[i, k] * u_max)
             authority[0, i] -= reach
@@ -140,8 +147,12 @@ def steer_by_engines(control, airspeed):
 
     B: the rows of the axes that need engines, `serving`.
     """
-    config, memory, output = control.engines.config, control.engines.memory, control.engines.output
-    w, table, base = memory.wanted, memory.thrust, control.power.output.command[0]
+    config = control.engines.config
+    memory = control.engines.memory
+    output = control.engines.output
+    w = memory.wanted
+    table = memory.thrust
+    base = control.power.output.command[0]
     saturated = control.allocation.output.saturated
     look_up(table, airspeed)
     limit(config, memory, output.authority, base)

@@ -68,8 +68,11 @@ def limit_airspeed_to_fly(ap, layout, surfaces, u, unexplained, y, t):
 
     u (n,) rad: where the surfaces are. unexplained: d / G, rad.
     """
-    holding, e, f = ap.holding, layout.main[PITCH], layout.stand_in
-    holding.fastest, holding.slowest = np.inf, 0.0
+    holding = ap.holding
+    e = layout.main[PITCH]
+    f = layout.stand_in
+    holding.fastest = np.inf
+    holding.slowest = 0.0
     effectiveness = surfaces.output.effectiveness
     E = effectiveness[e]
     healthy = E >= 1.0 and (f < 0 or effectiveness[f] >= 1.0)
@@ -111,8 +114,10 @@ def find_airspeeds_that_can_be_held(holding, layout, surfaces, y):
     the slowest: V = sqrt(2 qdyn / rho), qdyn by the table, rho kg/m3 of the air by the readings. A flap that
     is given up stands at its offset.
     """
-    e, f = layout.main[PITCH], layout.stand_in
-    E, E_flap = surfaces.output.effectiveness[e], surfaces.output.effectiveness[f]
+    e = layout.main[PITCH]
+    f = layout.stand_in
+    E = surfaces.output.effectiveness[e]
+    E_flap = surfaces.output.effectiveness[f]
     fixed = holding.mean_acting_elevator - holding.mean_commanded_elevator
     least, greatest = fixed + E * layout.low[e], fixed + E * layout.high[e]
     up, down = layout.low[f] + holding.flap_reserve, layout.high[f] - holding.flap_reserve
@@ -149,10 +154,12 @@ def dynamic_pressure_limit(holding, flap, elevator, limit):
 def approach_airspeed_to_fly(ap):
     """Move the airspeed to fly towards the nearest to the command that can be held, at most at
     max_airspeed_rate_mps2, so without a bump. Without a limit, it is the command."""
-    holding, command = ap.holding, ap.command[SPEED]
+    holding = ap.holding
+    command = ap.command[SPEED]
     target = min(max(command, holding.slowest), holding.fastest)
     if target == command and not holding.limits_airspeed:
-        ap.airspeed_to_fly, ap.airspeed_to_fly_rate = command, ap.command_rate[SPEED]
+        ap.airspeed_to_fly = command
+        ap.airspeed_to_fly_rate = ap.command_rate[SPEED]
         return
     step = clamp(target - ap.airspeed_to_fly, holding.max_airspeed_rate_mps2 * ap.dt)
     ap.airspeed_to_fly += step
@@ -168,7 +175,8 @@ def record_limits_in_force(ap, main, effectiveness, t):
     bank        while ailerons or rudder have lost effectiveness, and the limit, smoothed over ACTING_S of
                 this time, is more than NOTED_RAD below that in health
     """
-    holding, command = ap.holding, ap.command[SPEED]
+    holding = ap.holding
+    command = ap.command[SPEED]
     if ap.is_commanded[SPEED]:
         record_limit(holding, FASTEST, holding.fastest, holding.fastest < command - NOTED_MPS, t)
         record_limit(holding, SLOWEST, holding.slowest, holding.slowest > command + NOTED_MPS, t)
@@ -193,7 +201,8 @@ def set_up_level_flight_table(holding: np.void, layout: np.void, declared: Decla
     """Fill the table of level flight, if the aircraft's file has forces, the signal THRUST, and a stand-in
     for the elevator; has_table, only if there is level flight at each point. The dynamic pressures are those
     of the envelope's airspeeds at sea level."""
-    aircraft, flap = declared.aircraft, int(layout["stand_in"])
+    aircraft = declared.aircraft
+    flap = int(layout["stand_in"])
     fill(holding, from_s=-1.0, bank=radians(MOST_BANK_DEG), fastest=np.inf)
     if flap < 0 or not aircraft.forces or THRUST not in aircraft.signals:
         return
@@ -201,7 +210,8 @@ def set_up_level_flight_table(holding: np.void, layout: np.void, declared: Decla
     qdyn_pa = 0.5 * SEA_LEVEL_DENSITY_KG_M3 * speeds_mps**2
     flap_rad = np.linspace(layout["low"][flap], layout["high"][flap], N_FLAP)
     surfaces = aircraft.surfaces[layout["main"][PITCH]], aircraft.surfaces[flap]
-    mass_kg, scale = declared.mass.mass_kg, tuple(declared.scale.items())
+    mass_kg = declared.mass.mass_kg
+    scale = tuple(declared.scale.items())
     elevator = elevator_needed(aircraft, surfaces, mass_kg, scale, tuple(qdyn_pa), tuple(flap_rad))
     fill(
         holding, qdyn=qdyn_pa, flap=flap_rad, has_table=np.isfinite(elevator).all(), elevator=elevator,

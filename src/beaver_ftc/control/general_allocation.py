@@ -26,7 +26,8 @@ def allocate_generally(axes, allocation, layout, effectiveness, prediction, shar
     """Fill the command (n,) rad for axes.demand (3,) rad/s2. With several elevators (the main one has less
     than the whole authority of pitch) the backups take over no more than the share that the elevators have
     lost."""
-    problem, output = allocation.memory.problem, allocation.output
+    problem = allocation.memory.problem
+    output = allocation.output
     if layout.authority[PITCH, layout.main[PITCH]] < 1.0:
         share = min(share, 1.0 - remaining(layout, effectiveness, PITCH))
     set_problem(problem, axes.G, layout, effectiveness, prediction, share)
@@ -34,7 +35,8 @@ def allocate_generally(axes, allocation, layout, effectiveness, prediction, shar
         hold_probe(problem, layout.stand_in, layout.trim[layout.stand_in] + probe)
     solve(problem, axes.G, axes.demand)
     for s in range(output.command.size):
-        output.command[s], side = problem.u[s], problem.side[s]
+        output.command[s] = problem.u[s]
+        side = problem.side[s]
         stop = layout.low[s] if side == LOW else layout.high[s]
         output.saturated[s] = side != FREE and problem.u[s] == stop
 
@@ -55,10 +57,13 @@ def set_problem(problem, G, layout, effectiveness, prediction, share):
     Why this ratio: the backups then give `share` of what pitch demands beyond the trimmed moments. With two
     surfaces that move pitch alone this is the hand-over of `allocation.pitch`, up to the limits.
     """
-    others, backups, u = 0.0, 0.0, prediction.u
+    others = 0.0
+    backups = 0.0
+    u = prediction.u
     for s in range(u.size):
         reach = prediction.actuators.step[s] / prediction.w
-        half, E = 0.5 * (layout.high[s] - layout.low[s]), effectiveness[s]
+        half = 0.5 * (layout.high[s] - layout.low[s])
+        E = effectiveness[s]
         trim = layout.trim[s] / E if E > 0.0 else layout.trim[s]
         problem.u_preferred[s] = within_stops(layout, s, trim)
         problem.weight[s] = half * half

@@ -25,7 +25,8 @@ def bank_angle_rate(ap, attitude):
     The loop is slower where engines alone yaw and roll the aircraft. phi_c is within bank_limit. If neither
     heading nor bank is commanded, the rate is 0.
     """
-    gain, roll_loss = ap.gain, ap.roll_loss_share
+    gain = ap.gain
+    roll_loss = ap.roll_loss_share
     share = 1.0 - roll_loss * ap.engines_alone_yaw_share * (1.0 - LOOP_GAIN_SHARE_BY_POWER)
     if ap.is_commanded[HEADING]:
         bank = bank_to_turn(ap, share, attitude[YAW])
@@ -51,7 +52,8 @@ def bank_to_turn(ap, share, heading):
 
     So where nothing acts in yaw, the loop is slower, and integrates its error.
     """
-    gain, yaw_loss = ap.gain, ap.yaw_loss_share
+    gain = ap.gain
+    yaw_loss = ap.yaw_loss_share
     error = wrapped(ap.command[HEADING] - heading)
     loose = 1.0 - yaw_loss * (1.0 - gain.loose)
     M = ap.missing_turn_rate + ap.dt * yaw_loss * gain.heading_i * error

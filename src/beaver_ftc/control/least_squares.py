@@ -49,7 +49,8 @@ def solve(problem, B, demand):
     the minimum.
     """
     warm_start(problem, B)
-    n, u = problem.u.size, problem.u
+    n = problem.u.size
+    u = problem.u
     for _ in range(4 * n + 4):
         multipliers(problem, B, demand)
         blocking, share = blocking_surface(problem, B)
@@ -97,7 +98,9 @@ def multipliers(problem, B, demand):
 
     by Cholesky: S = L L', L z = d - B u0, L' y = z. L takes the place of S, and z that of y in between.
     """
-    S, y, slack = problem.S, problem.y, problem.slack
+    S = problem.S
+    y = problem.y
+    slack = problem.slack
     S[:] = 0.0
     copy(demand, y)
     for i in range(3):
@@ -127,14 +130,17 @@ def multipliers(problem, B, demand):
 def blocking_surface(problem, B):
     """The free surface that meets a limit first on its way to `wanted`, -1 for none, and the share of the way
     up to the limit, 0 to 1."""
-    blocking, share = -1, 1.0
+    blocking = -1
+    share = 1.0
     for s in range(problem.u.size):
-        target, u_s = wanted(problem, B, s), problem.u[s]
+        target = wanted(problem, B, s)
+        u_s = problem.u[s]
         if problem.side[s] == FREE and (target < problem.low[s] or target > problem.high[s]):
             limit = problem.low[s] if target < problem.low[s] else problem.high[s]
             share_s = (limit - u_s) / (target - u_s) if target != u_s else 0.0
             if blocking < 0 or share_s < share:
-                blocking, share = s, share_s
+                blocking = s
+                share = share_s
     return blocking, share
 
 
@@ -142,11 +148,13 @@ def blocking_surface(problem, B):
 def release(problem, B):
     """Free the surface that would move farthest inside its limit, by side (u - (p + v B' y)) rad, and by more
     than ROUNDING; returns whether there is one. side is 0 for a free surface."""
-    farthest, largest = -1, ROUNDING
+    farthest = -1
+    largest = ROUNDING
     for s in range(problem.u.size):
         inside = problem.side[s] * (problem.u[s] - wanted(problem, B, s))
         if inside > largest:
-            farthest, largest = s, inside
+            farthest = s
+            largest = inside
     if farthest >= 0:
         problem.side[farthest] = FREE
     return farthest >= 0

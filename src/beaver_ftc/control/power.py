@@ -83,7 +83,9 @@ def _has_piston_engine(aircraft: Aircraft) -> bool:
 
 def configure_power(power: np.void, layout: np.void, declared: Declared) -> None:
     """Fill the record (dtype POWER); layout: of the surfaces."""
-    settings, dt, config = declared.control.power, 1.0 / declared.rate_hz, power["config"]
+    settings = declared.control.power
+    dt = 1.0 / declared.rate_hz
+    config = power["config"]
     lags_s = settings.smoothing_s, settings.washout_s, settings.attitude_memory_s
     smoothing, washout, leak = (1.0 - exp(-dt / lag_s) for lag_s in lags_s)
     fill(
@@ -120,7 +122,8 @@ def pitch_is_lost(layout, surfaces, saturated, shortfall):
 
     shortfall (3,) rad/s2; saturated (n,).
     """
-    effectiveness, elevator = surfaces.output.effectiveness, layout.main[PITCH]
+    effectiveness = surfaces.output.effectiveness
+    elevator = layout.main[PITCH]
     least = surfaces.config.least_effectiveness
     remains = remaining(layout, effectiveness, PITCH)
     for s in range(effectiveness.size):
@@ -139,11 +142,14 @@ def engage(power, is_lost, t):
 
     impatience: dt / patience_s; forgiveness: dt / release_s. theta_m begins at 0.
     """
-    config, memory, output = power.config, power.memory, power.output
+    config = power.config
+    memory = power.memory
+    output = power.output
     change = config.impatience if is_lost else -config.forgiveness
     memory.lost = min(max(memory.lost + change, 0.0), 1.0)
     if memory.lost == 1.0 and not memory.engaged:
-        memory.engaged, memory.attitude = 1, 0.0
+        memory.engaged = 1
+        memory.attitude = 0.0
         if output.from_s < 0.0:
             output.from_s = t
     elif memory.lost == 0.0:
@@ -169,7 +175,9 @@ def follow(config, memory, reference, x, y):
 def wanted(power, y):
     """The setting that the law wants, inHg: P = base - K_V (V - V_bar) + K_theta theta_m, within `ceiling`
     and its range, while it is engaged; else `base`."""
-    config, memory, P = power.config, power.memory, power.setpoint.base
+    config = power.config
+    memory = power.memory
+    P = power.setpoint.base
     if not memory.engaged:
         return P
     P -= config.speed_gain * (memory.speed - memory.usual_speed)
@@ -184,7 +192,8 @@ def steer_by_power(power, reference, x, y, may_engage, is_lost, t):
     may_engage: whether power may take over (after an alarm); is_lost: `pitch_is_lost` now. `moved` of the
     memory keeps the levers in use after the law has handed back, until they are at `base` again.
     """
-    memory, output = power.memory, power.output
+    memory = power.memory
+    output = power.output
     follow(power.config, memory, reference, x, y)
     if may_engage:
         engage(power, is_lost, t)
@@ -208,7 +217,8 @@ def moved(before, wanted, step):
 def follow_autopilot(power, setting, airspeed):
     """Take the autopilot's setting as `base`, and its airspeed, m/s, as V_bar while this law is engaged: the
     law has an airspeed loop of its own. If the law may not use the engine, move the lever to the setting."""
-    power.output.in_use, power.setpoint.base = 1, setting
+    power.output.in_use = 1
+    power.setpoint.base = setting
     if power.memory.engaged:
         power.memory.usual_speed = airspeed
     if not power.config.enabled:

@@ -37,7 +37,8 @@ def configure_probe(probe: np.void, probing: Probing | None, dt: float) -> None:
 def advance_probe(probe, wanted, t):
     """Bring the probe to the next frame, at t s. It begins once in a flight, when it is wanted. It ends at
     rest, that is after a whole period, once it is no longer wanted or has lasted config.frames."""
-    config, memory = probe.config, probe.memory
+    config = probe.config
+    memory = probe.memory
     if memory.probed == 0:
         if not wanted or memory.from_s >= 0.0:
             return
@@ -45,7 +46,9 @@ def advance_probe(probe, wanted, t):
     phase = config.step * memory.probed
     at_rest = phase % (2.0 * pi) < config.step
     if at_rest and (not wanted or memory.probed >= config.frames):
-        memory.deflection, memory.probed, memory.to_s = 0.0, 0, t
+        memory.deflection = 0.0
+        memory.probed = 0
+        memory.to_s = t
         return
     memory.deflection = 0.5 * config.amplitude * (1.0 - np.cos(phase))
     memory.probed += 1

@@ -30,7 +30,9 @@ def slipstream_limits(declared: Declared, layout: np.void) -> tuple[float, float
     Cn_dr: sum over the terms of all surfaces that move mainly yaw, without signals.
     """
     initial: Any = declared.initial  # the keys of its engine differ between aircraft
-    aircraft, rudder, rpm = declared.aircraft, layout["main"][YAW], initial.engine_rpm
+    aircraft = declared.aircraft
+    rudder = layout["main"][YAW]
+    rpm = initial.engine_rpm
     Cn = [term for term in aircraft.terms.values() if term.coefficient == "Cn"]
     rudders = {s for s, axis in zip(aircraft.surfaces, aircraft.dominant_axis, strict=True) if axis == YAW}
     Cn_dr = sum(declared.terms[term.name] for term in Cn if not term.of and term.surface in rudders)

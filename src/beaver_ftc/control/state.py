@@ -64,7 +64,9 @@ def configure(control: np.void, declared: Declared, travel: np.ndarray) -> None:
     """Fill the records that all laws share; travel (2, n) rad: the stops. `configure_law` fills that of the
     law. The order matters: allocation reads the length of a frame from the reference, and power the layout of
     allocation."""
-    config, dt, row = declared.control, 1.0 / declared.rate_hz, row_of(declared.control.law)
+    config = declared.control
+    dt = 1.0 / declared.rate_hz
+    row = row_of(declared.control.law)
     control["config"] = row.place, row.uses_verdict, row.reallocates, row.informed
     configure_reference(control["reference"], config, dt)
     accommodation.configure(control["surfaces"], config, row.informed, dt)
@@ -106,9 +108,11 @@ def take_over(new: np.void, before: np.void, learnt: np.ndarray) -> None:
         reference = new["reference"]["output"]
         for kind in ("rate", "acceleration"):
             reference[f"governed_{kind}"] = reference[f"model_{kind}"]
-        source, unexplained = new, np.zeros(3)
+        source = new
+        unexplained = np.zeros(3)
     else:
-        law, source = in_charge(before), before
+        law = in_charge(before)
+        source = before
         unexplained = law.unexplained(before) if law.unexplained else before["surfaces"]["output"]["unknown"]
     if (begin := in_charge(new).begin) is not None:
         begin(new, source, unexplained, learnt)

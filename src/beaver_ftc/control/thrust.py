@@ -35,9 +35,12 @@ def set_up_engine(engine: np.void, thrust: Any, mass_kg: float) -> None:
     """Fill the record (dtype ENGINE) from a file's `engine.thrust`; None leaves it empty."""
     if thrust is None:
         return
-    m, n = len(thrust.airspeed_mps), len(thrust.setting)
-    engine["airspeeds"], engine["settings"] = m, n
-    engine["airspeed"][:m], engine["setting"][:n] = thrust.airspeed_mps, thrust.setting
+    m = len(thrust.airspeed_mps)
+    n = len(thrust.setting)
+    engine["airspeeds"] = m
+    engine["settings"] = n
+    engine["airspeed"][:m] = thrust.airspeed_mps
+    engine["setting"][:n] = thrust.setting
     engine["table"][:m, :n] = np.array(thrust.force_n) / mass_kg + LEAST_RISE * np.arange(n)
 
 

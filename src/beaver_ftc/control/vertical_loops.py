@@ -84,7 +84,9 @@ def path_angle_to_fly(ap, measured, push):
         return glide_path_angle(ap)
     if not ap.is_commanded[ALTITUDE]:
         return measured.attitude[PITCH] - ap.alpha
-    V, gain, M = ap.airspeed, ap.gain, ap.missing_path_angle
+    V = ap.airspeed
+    gain = ap.gain
+    M = ap.missing_path_angle
     error = ap.command[ALTITUDE] - measured.altitude
     demand = (ap.command_rate[ALTITUDE] + gain.altitude * error) / V + M
     low, high = path_angle_limits(ap, push)
@@ -129,12 +131,17 @@ def path_angle_limits(ap, push):
     fly, and slow at least slowest_mps. Without a commanded airspeed the engine stays as trimmed, slow is
     slowest_mps, and low is -MOST_PATH_RAD. gained: thrust.py, m/s2, over the setting in trim.
     """
-    gain, trim, slow = ap.gain, ap.trim_power, ap.slowest_mps
-    fast, idle, full = np.inf, trim, trim
+    gain = ap.gain
+    trim = ap.trim_power
+    slow = ap.slowest_mps
+    fast = np.inf
+    idle = trim
+    full = trim
     if ap.is_commanded[SPEED]:
         slow = max(slow, ap.airspeed_to_fly - gain.spare_mps)
         fast = ap.airspeed_to_fly + gain.spare_mps
-        idle, full = ap.low_power, max(ap.full_power, ap.low_power)
+        idle = ap.low_power
+        full = max(ap.full_power, ap.low_power)
     at_idle = ap.climb_in_trim + gained(ap.engine, push, trim, idle) / ap.gravity
     at_full = ap.climb_in_trim + gained(ap.engine, push, trim, full) / ap.gravity
     low = at_idle - gain.path_per_mps * (fast - ap.airspeed)
@@ -166,8 +173,11 @@ def set_power(ap, power, y, path, push):
     MAX_FROM_RECENT_MPS of the recent airspeed. At either end of the range, a room is kept for engines that
     alone yaw the aircraft; the upper end is full_power, or `ceiling` if it is lower.
     """
-    V, V_c, recent = ap.airspeed, ap.airspeed_to_fly, ap.recent_airspeed_mps
-    error, A = V_c - V, ap.airspeed_to_fly_rate + ap.missing_acceleration
+    V = ap.airspeed
+    V_c = ap.airspeed_to_fly
+    recent = ap.recent_airspeed_mps
+    error = V_c - V
+    A = ap.airspeed_to_fly_rate + ap.missing_acceleration
     if power.memory.engaged:
         ap.power_airspeed = recent + clamp(V_c - recent, MAX_FROM_RECENT_MPS)
         error = ap.power_airspeed - V

@@ -192,7 +192,9 @@ def add_published_bound(x, model, c, b, w_E, eta):
     of the magnitudes of the factors of products of two rates on axis i, in pitch with twice the larger of
     those of p^2 and r^2, at least 1; rho: ROUNDING_RAD_S2.
     """
-    p, q, r = x[0], x[1], x[2]
+    p = x[0]
+    q = x[1]
+    r = x[2]
     total = abs(p) + abs(q) + abs(r)
     coupling = model.Pqr * q * r, model.Qpr * p * r, model.Rpq * p * q
     factor = (

@@ -160,7 +160,11 @@ def update_residual(fie, kind, x):
     within = True
     for i in range(3):
         fie.residual[i] = x[i] - fie.xhat[i]
-        lo, hi, Om, th, B = fie.theta_min, fie.theta_max, fie.Om[i], fie.theta[i], fie.B[i]
+        lo = fie.theta_min
+        hi = fie.theta_max
+        Om = fie.Om[i]
+        th = fie.theta[i]
+        B = fie.B[i]
         mu = -B, B
         if kind == INTERVAL_THRESHOLD:
             mu = residual_interval(lo, hi, fie.R_pos[i], Om - fie.R_pos[i], Om, th, B)
@@ -228,7 +232,9 @@ def advance_estimator(iso, fie, bound, x, F, dt):
     is the residual eps; fie.effect must be that of this frame. The order matters: th moves before Om, which
     then carries the step into xhat.
     """
-    cfg, phi, th = iso.config, fie.effect, fie.theta
+    cfg = iso.config
+    phi = fie.effect
+    th = fie.theta
     for i in range(3):
         effect = F[i] + phi.h[i] + phi.Z[i] * th[i]
         fie.xhat[i] = x[i] + dt * effect + cfg.a[i] * (fie.xhat[i] - x[i])

@@ -132,7 +132,10 @@ def fill_force(gust, x, y, u, f):
 @kernel
 def fill_rotation(phi, th, T):
     """Fill T (3, 3), the rotation from level axes (forward, right, down) to body axes; angles rad."""
-    s_phi, c_phi, s_th, c_th = np.sin(phi), np.cos(phi), np.sin(th), np.cos(th)
+    s_phi = np.sin(phi)
+    c_phi = np.cos(phi)
+    s_th = np.sin(th)
+    c_th = np.cos(th)
     T[0, :] = c_th, 0.0, -s_th
     T[1, :] = s_phi * s_th, c_phi, s_phi * c_th
     T[2, :] = c_phi * s_th, -s_phi, c_phi * c_th
@@ -258,8 +261,10 @@ def update_rotation(gust, dv, psi_dot, dt):
     cfg = gust.config
     mem = gust.memory
     V = gust.output.V
-    tau_q, tau_r = gust_lag(gust, PITCH, V), gust_lag(gust, YAW, V)
-    a_q, a_r = np.exp(-dt / tau_q), np.exp(-dt / tau_r)
+    tau_q = gust_lag(gust, PITCH, V)
+    tau_r = gust_lag(gust, YAW, V)
+    a_q = np.exp(-dt / tau_q)
+    a_r = np.exp(-dt / tau_r)
     share = psi_dot * psi_dot * cfg.span * cfg.L_gust / (pi * V * V)
     larger = max(mem.turn_now, share)
     mem.turn_now = share

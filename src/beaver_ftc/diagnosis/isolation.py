@@ -172,7 +172,10 @@ def widen_error(fie, bound, nu, n_substeps):
     is taken to be within u_far of neutral. For the mean position p the surface is then further out at the
     other substeps, to make up for the first:  mean |position| <= |p| + first,  first = 2 u_far / n.
     """
-    s, phi, emap, i = fie.surface, fie.effect, bound.error_map, 0
+    s = fie.surface
+    phi = fie.effect
+    emap = bound.error_map
+    i = 0
     for j in range(1, 3):
         if abs(phi.Z[j]) > abs(phi.Z[i]):
             i = j
@@ -229,7 +232,9 @@ def update_effects(iso, bank, bound, config, detected, G, Gu, e_Gu):
     if not (iso.config.reach or config.diagnoses_all_types or detected):
         return
     for fie in iso.estimator[: iso.config.n_estimators]:
-        phi, s, stuck = fie.effect, fie.surface, fie.hypothesis_kind == POSITION_HYPOTHESIS
+        phi = fie.effect
+        s = fie.surface
+        stuck = fie.hypothesis_kind == POSITION_HYPOTHESIS
         for i in range(3):
             phi.h[i] = -Gu[i, s] if stuck else 0.0
             phi.Z[i] = G[i, s] if stuck else Gu[i, s]

@@ -150,8 +150,10 @@ def add_to_sums(pred, bound, layout, all_types):
                 bound.extra[j, i] += w * extra_bound(bound.error_map, j, i)
     if all_types:
         for s, i in enumerate(layout.dominant_axis):
-            sums.G_min[s], sums.G_max[s] = min(sums.G_min[s], G[i, s]), max(sums.G_max[s], G[i, s])
-            sums.u_min[s], sums.u_max[s] = min(sums.u_min[s], u[s]), max(sums.u_max[s], u[s])
+            sums.G_min[s] = min(sums.G_min[s], G[i, s])
+            sums.G_max[s] = max(sums.G_max[s], G[i, s])
+            sums.u_min[s] = min(sums.u_min[s], u[s])
+            sums.u_max[s] = max(sums.u_max[s], u[s])
 
 
 @kernel

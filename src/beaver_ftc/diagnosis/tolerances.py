@@ -41,7 +41,8 @@ def coefficient_bounds(declared: Declared, model: np.void, y: np.ndarray, u: np.
     e_inertia = max(dI.Pl / nominal.Pl, dI.Qm / nominal.Qm, dI.Rn / nominal.Rn)
     relative = e_inertia + np.array([_signal_error(errors, term) for term in aircraft.moments])
     tol = declared.coefficients.absolute(aircraft.moments, C) + relative * C
-    b, c = aircraft.geometry.span_m, aircraft.geometry.chord_m
+    b = aircraft.geometry.span_m
+    c = aircraft.geometry.chord_m
     slopes = np.abs(coefficient_slopes(model, np.zeros(3), y, u))[:, PH : RH + 1]
     by_gyros = slopes @ (errors.each("steady", AXES) * (b / 2, c, b / 2) / y[AIRSPEED])
     tol += [by_gyros[moment_axis(term)] * term.is_constant for term in aircraft.moments]

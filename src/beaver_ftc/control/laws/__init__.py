@@ -34,8 +34,10 @@ def prepare(control, assessment, prediction, mode, t):
     Pitch is handed over at once if a surface is or was slow or parked (the reference is then governed,
     reference.py), or if the diagnosis of all types has found that the main surface is to be given up.
     """
-    surfaces, config = control.surfaces, control.config
-    output, least = surfaces.output, surfaces.config.least_effectiveness
+    surfaces = control.surfaces
+    config = control.config
+    output = surfaces.output
+    least = surfaces.config.least_effectiveness
     allocation.form_effectiveness_matrix(control.axes, prediction.G, surfaces, config.uses_verdict)
     remains = authority.remaining(control.layout, output.effectiveness, PITCH)
     given_up = remains < least and assessment.diagnoses_all_types
@@ -57,8 +59,12 @@ def command_surfaces(control, assessment, faults, prediction, by_observer):
     carries only what the main surface has lost. If the allocation is not general and the law uses the
     verdict, the flap takes from the alarm on what an elevator at its stop leaves.
     """
-    axes, layout, surfaces, out = control.axes, control.layout, control.surfaces, control.allocation.output
-    uses_verdict, effectiveness = control.config.uses_verdict, surfaces.output.effectiveness
+    axes = control.axes
+    layout = control.layout
+    surfaces = control.surfaces
+    out = control.allocation.output
+    uses_verdict = control.config.uses_verdict
+    effectiveness = surfaces.output.effectiveness
     if uses_verdict:
         allocation.subtract_offsets(axes, surfaces.output.offset, prediction.G)
     share = out.transfer_share if by_observer else allocation.smoothstep(out.hand_over)
@@ -80,9 +86,14 @@ def complete(control, assessment, measured, t):
     engines_serve: whether engines may act: while the alarm stands, and at any time for a law that is informed
     of the truth. power_stage: the common lever; engine_stage: the engines that are effectors.
     """
-    out, surfaces, axes, layout = control.allocation.output, control.surfaces, control.axes, control.layout
-    power_stage, engine_stage = control.power, control.engines
-    config, output = engine_stage.config, engine_stage.output
+    out = control.allocation.output
+    surfaces = control.surfaces
+    axes = control.axes
+    layout = control.layout
+    power_stage = control.power
+    engine_stage = control.engines
+    config = engine_stage.config
+    output = engine_stage.output
     engines_serve = assessment.detected or control.config.informed
     authority.note_shortfall(axes, out.command, layout, surfaces.output.lag, output.authority)
     if power_stage.config.enabled:

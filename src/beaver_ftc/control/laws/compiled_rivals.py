@@ -34,8 +34,11 @@ def rival_dtype(n: int) -> np.dtype:
 @apart
 def command(control, assessment, faults, prediction, measured, mode, t):
     """From what is measured to the command of each surface (control.CompiledLaw)."""
-    law, reference, layout = control.compiled_rivals, control.reference, control.layout
-    allocated, target = control.allocation.output, reference.output
+    law = control.compiled_rivals
+    reference = control.reference
+    layout = control.layout
+    allocated = control.allocation.output
+    target = reference.output
     u = allocated.command
     copy(layout.trim, u)
     add_command(
@@ -96,11 +99,13 @@ def increment(law, dt, rate, acceleration, main, x, Gu, G, demand, u):
     xdot0: measured acceleration; G u0: acceleration by the positions of these surfaces over the elapsed
     frame. Both pass the same filter. In the first frame, both have their initial values.
     """
-    config, memory = law.config, law.memory
+    config = law.config
+    memory = law.memory
     for i in range(3):
         e = rate[i] - x[i]
         integral = integrate_error(memory, dt, i, e)
-        xdot0, G_u0 = memory.rate_filter[1, i], memory.surface_filter[1, i]
+        xdot0 = memory.rate_filter[1, i]
+        G_u0 = memory.surface_filter[1, i]
         if memory.begun:
             xdot0 = smooth(memory.rate_filter, i, (x[i] - memory.x_before[i]) / dt, config.keep)
             by_surfaces = 0.0
@@ -127,7 +132,8 @@ def smooth(filtered, i, value, keep):
 @kernel
 def cross(G, i, j, k):
     """Component k of column i x column j of G (3, n)."""
-    a, b = (k + 1) % 3, (k + 2) % 3
+    a = (k + 1) % 3
+    b = (k + 2) % 3
     return G[a, i] * G[b, j] - G[b, i] * G[a, j]
 
 

@@ -86,8 +86,10 @@ def begin_estimator(estimator, squares, frames, dt):
     (3,) in health; its root is at least _LEAST_NOISE_RAD_S2 dt before the factor; dt s.
     """
     estimator.active = 1
-    N, n = estimator.parameters.size, estimator.parameters.size - 3 * _SIGNALS
-    estimator.P[:], estimator.parameters[:] = 0.0, 0.0
+    N = estimator.parameters.size
+    n = estimator.parameters.size - 3 * _SIGNALS
+    estimator.P[:] = 0.0
+    estimator.parameters[:] = 0.0
     for j in range(N):
         spread = _THETA_STD if j < n else _A_STD[(j - n) % _SIGNALS]
         estimator.P[j, j] = estimator.prior[j] = spread * spread
@@ -95,7 +97,8 @@ def begin_estimator(estimator, squares, frames, dt):
     for i in range(3):
         estimator.noise[i] = _CORRELATED * max(squares[i] / max(frames[i], 1.0), least * least)
     for error in estimator.errors:
-        error.rate[:], error.disturbance[:] = 0.0, 0.0
+        error.rate[:] = 0.0
+        error.disturbance[:] = 0.0
 
 
 @apart
@@ -112,14 +115,22 @@ def estimate(estimator, innovation, L_rate, L_disturbance, dt, x, y, effectivene
     x (3,) rad/s, y: measured; effectiveness (n,): that the law assumes; moments (3, n) rad/s2: of healthy
     surfaces.
     """
-    n, h, signal, prior = effectiveness.size, estimator.h, estimator.signal, estimator.prior
-    P, w, errors = estimator.P, estimator.parameters, estimator.errors
+    n = effectiveness.size
+    h = estimator.h
+    signal = estimator.signal
+    prior = estimator.prior
+    P = estimator.P
+    w = estimator.parameters
+    errors = estimator.errors
     for j in range(h.size):
         P[j, j] = min(P[j, j] + prior[j] * dt / _FORGOTTEN_S, max(P[j, j], prior[j]))
-    signal[0], signal[1] = y[ALPHA], y[BETA]
+    signal[0] = y[ALPHA]
+    signal[1] = y[BETA]
     copy(x, signal[2:])
     for i in range(3):
-        L, M, assumed = L_rate[i], L_disturbance[i], 0.0
+        L = L_rate[i]
+        M = L_disturbance[i]
+        assumed = 0.0
         h[:] = 0.0
         for s in range(n):
             assumed += (effectiveness[s] - 1.0) * moments[i, s]
@@ -143,8 +154,12 @@ def update(estimator, z, noise):
 
     w, h (N,), P (N, N); Ph: P h.
     """
-    w, h, P, Ph = estimator.parameters, estimator.h, estimator.P, estimator.Ph
-    v, r = noise, z
+    w = estimator.parameters
+    h = estimator.h
+    P = estimator.P
+    Ph = estimator.Ph
+    v = noise
+    r = z
     for j in range(h.size):
         Ph[j] = 0.0
         for k in range(h.size):

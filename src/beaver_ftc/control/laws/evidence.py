@@ -43,7 +43,9 @@ def restart_at_naming(sums, i):
     """When the main surface of axis i is named for the first time, restart the sums of psi e and psi^2, which
     come from its healthy time. The noise level, sum e^2 / frames, is kept."""
     if not sums.named[i]:
-        sums.named[i], sums.product[i], sums.square[i] = 1, 0.0, 0.0
+        sums.named[i] = 1
+        sums.product[i] = 0.0
+        sums.square[i] = 0.0
 
 
 @kernel
@@ -93,8 +95,11 @@ def accumulate(config, memory, i, effectiveness, moment, innovation):
     observer: `observer_response`; innovation rad/s: that of the law's observer; effectiveness: what the law
     assumes of the main surface; moment rad/s2: G u of a healthy main surface.
     """
-    sums, fading, dt = memory.sums, config.fading, config.dt
-    L_rate, L_disturbance = memory.L_rate[i], memory.L_disturbance[i]
+    sums = memory.sums
+    fading = config.fading
+    dt = config.dt
+    L_rate = memory.L_rate[i]
+    L_disturbance = memory.L_disturbance[i]
     assumed = (effectiveness - 1.0) * moment
     psi = observer_response(memory.healthy, i, moment, L_rate, L_disturbance, dt)
     e = innovation + observer_response(memory.assumed, i, assumed, L_rate, L_disturbance, dt)

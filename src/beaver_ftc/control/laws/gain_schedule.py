@@ -37,8 +37,11 @@ def configure(law: np.void, control: np.void, prediction: np.void, declared: Dec
     approach (n,): share of the way to its command that a surface goes in a frame. G (points, 3, n) rad/s2 per
     rad. keep: pole of a gyro's lag over a frame, exp(-bandwidth dt); 0 for a gyro without lag.
     """
-    config, layout, design = law["config"], control["layout"], prediction["design"]
-    dt, share = 1.0 / declared.rate_hz, 1.0 / declared.substeps
+    config = law["config"]
+    layout = control["layout"]
+    design = prediction["design"]
+    dt = 1.0 / declared.rate_hz
+    share = 1.0 / declared.substeps
     points = schedule_points(declared, y)
     G = np.array([effectiveness(design, point) for point in points])
     approach = 1.0 - (1.0 - prediction["actuators"]["approach"]) ** declared.substeps
@@ -75,7 +78,8 @@ def allowed_speeds(declared: Declared, loops: list[tuple[int, int]], D: np.ndarr
 
     A surface that leads two axes has the speed of the second one.
     """
-    limits_rad_s, share = servo_data(declared)["rate_limit_rad_s"], declared.control.noise_share
+    limits_rad_s = servo_data(declared)["rate_limit_rad_s"]
+    share = declared.control.noise_share
     return {
         s: share * sqrt(D[axis] / D.max()) * float(limits_rad_s[s] or DEFAULT_RATE_RAD_S) for axis, s in loops
     }

@@ -87,11 +87,14 @@ def controller(loop: Loop, s: float, z: np.ndarray) -> np.ndarray:
 
     A row is an equation; its columns are xhat, d, p and c, and `driven` is what x multiplies.
     """
-    dt, share = loop.dt_s, loop.share
+    dt = loop.dt_s
+    share = loop.share
     L_rate, L_disturbance = corrections(s, dt)
-    keep, z_inv = 1 - L_rate, 1.0 / z
+    keep = 1 - L_rate
+    z_inv = 1.0 / z
     mean = share * z_inv + 1.0 - share
-    ones, zeros = np.ones_like(z), np.zeros_like(z)
+    ones = np.ones_like(z)
+    zeros = np.zeros_like(z)
     rows = [
         [ones - keep * z_inv, -keep * dt * z_inv, -keep * dt * mean, zeros],
         [L_disturbance * z_inv, ones - z_inv + L_disturbance * dt * z_inv, L_disturbance * dt * mean, zeros],
@@ -127,7 +130,8 @@ def margins(L: np.ndarray) -> tuple[float, float, float]:
     """
     if not L.any():
         return inf, inf, inf
-    level, phase = 20.0 * np.log10(np.abs(L)), np.degrees(np.unwrap(np.angle(L)))
+    level = 20.0 * np.log10(np.abs(L))
+    phase = np.degrees(np.unwrap(np.angle(L)))
     turns = (-1260.0, -900.0, -540.0, -180.0, 180.0)  # deg, where L is real and negative
     levels = [x for turn in turns for x in _at_zeros(phase - turn, level)]
     if L[-1].real < -abs(L[-1].imag) * 1e6:

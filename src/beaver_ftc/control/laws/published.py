@@ -45,7 +45,8 @@ def command(control, assessment, faults, prediction, measured, mode, t):
 @kernel
 def command_by(law, fhat, control, assessment, faults, prediction, measured, mode, t):
     """The steps of the law in a frame, with a record of type FEEDBACK; zhang2005.py has its own fhat."""
-    axes, reference = control.axes, control.reference
+    axes = control.axes
+    reference = control.reference
     laws.prepare(control, assessment, prediction, mode, t)
     demand(law, axes, reference.output, measured.x, prediction.f, fhat)
     laws.command_surfaces(control, assessment, faults, prediction, laws.WITHOUT_OBSERVER)
@@ -78,7 +79,8 @@ def integrate(law, axes, reference, u, x):
     u (n,) rad: the command. The gain 1/Kp of this back-calculation unwinds the integral within one time
     constant of the closed loop.
     """
-    G, dt = axes.G, reference.config.dt
+    G = axes.G
+    dt = reference.config.dt
     for i in range(3):
         acceleration = 0.0
         for s in range(u.size):

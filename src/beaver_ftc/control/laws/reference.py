@@ -64,7 +64,8 @@ def advance(config, xm, dxm, ref):
 
     (xm, xm') <- A (xm, xm') + B ref
     """
-    A, B = config.A, config.B
+    A = config.A
+    B = config.B
     return (
         A[0, 0] * xm + A[0, 1] * dxm + B[0] * ref,
         A[1, 0] * xm + A[1, 1] * dxm + B[1] * ref,
@@ -75,7 +76,8 @@ def advance(config, xm, dxm, ref):
 def follow(config, output, commanded):
     """Advance the model, xm and xm' (3,), by one frame towards `commanded` (3,) rad/s."""
     copy(commanded, output.commanded_rate)
-    xm, dxm = output.model_rate, output.model_acceleration
+    xm = output.model_rate
+    dxm = output.model_acceleration
     for i in range(3):
         xm[i], dxm[i] = advance(config, xm[i], dxm[i], commanded[i])
 
@@ -93,14 +95,18 @@ def govern(reference, commanded, shortfall, authority_lost):
     rad/s; shortfall (3,) rad/s2: the part of the demand that was not given. authority_lost: whether a surface
     is slow or parked now; from then on the reference is governed.
     """
-    config, governor, output = reference.config, reference.memory, reference.output
+    config = reference.config
+    governor = reference.memory
+    output = reference.output
     if authority_lost:
         governor.active = 1
     if not governor.active:
         output.governed_rate = output.model_rate
         output.governed_acceleration = output.model_acceleration
         return
-    dt, xm, dxm = config.dt, output.governed_rate, output.governed_acceleration
+    dt = config.dt
+    xm = output.governed_rate
+    dxm = output.governed_acceleration
     for i in range(3):
         if not config.steered:
             scale = governor.scale[i] - dt * abs(shortfall[i]) / MISSED_RAD_S

@@ -109,8 +109,11 @@ def accommodate(control, assessment, faults, prediction, measured):
     if control.config.informed:
         accommodation.accommodate(control, assessment, faults, prediction, measured)
         return
-    law, surfaces, layout = control.rejecting, control.surfaces, control.layout
-    memory, output = law.memory, surfaces.output
+    law = control.rejecting
+    surfaces = control.surfaces
+    layout = control.layout
+    memory = law.memory
+    output = surfaces.output
     dt = law.config.dt
     least = surfaces.config.least_effectiveness
     begin_frame(output, assessment.lags)
@@ -181,8 +184,10 @@ def observe(law, output, main, x, design, moments, G):
     `explained`, a mean over the elapsed frame, as are design (3,), moments (3, n) and G (3, n); output: that
     of accommodation.py.
     """
-    observer, memory = law.observer, law.memory
-    xhat, d = observer.rate, observer.disturbance
+    observer = law.observer
+    memory = law.memory
+    xhat = observer.rate
+    d = observer.disturbance
     if not observer.begun:
         observer.begun = 1
         copy(x, xhat)
@@ -205,8 +210,11 @@ def demand(control, prediction, measured):
     xm, xm_after: at the instant from which the command acts, and a frame later (`targets`); xm' = (xm_after -
     xm) / dt; x+: `memory.ahead`.
     """
-    law, output = control.rejecting, control.surfaces.output
-    config, memory, means = law.config, law.memory, prediction.means
+    law = control.rejecting
+    output = control.surfaces.output
+    config = law.config
+    memory = law.memory
+    means = prediction.means
     schedule(config, memory, measured.y[QDYN], control.allocation.output.transfer_share)
     observe(law, output, control.layout.main, measured.x, means.F, means.Gu, means.G)
     if memory.estimator.active:
@@ -244,8 +252,10 @@ def targets(reference, i, share):
 
     xm_0 + share (xm_1 - xm_0),    xm_1 + share (xm_2 - xm_1)
     """
-    config, output = reference.config, reference.output
-    xm_0, acceleration = output.governed_rate[i], output.governed_acceleration[i]
+    config = reference.config
+    output = reference.output
+    xm_0 = output.governed_rate[i]
+    acceleration = output.governed_acceleration[i]
     wanted = reference.memory.scale[i] * output.commanded_rate[i]
     xm_1, acceleration = advance(config, xm_0, acceleration, wanted)
     xm_2, _ = advance(config, xm_1, acceleration, wanted)

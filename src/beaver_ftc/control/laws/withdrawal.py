@@ -58,16 +58,21 @@ def withdraw(memory, layout, s, saturated, suspected, dt):
     T, t in a condition count this frame. patience: PATIENCE_S if another surface takes its place, else
     LONG_PATIENCE_S. k: STOP_RECOVERY.
     """
-    T, t = memory.at_stop_s, memory.out_of_use_s
+    T = memory.at_stop_s
+    t = memory.out_of_use_s
     if not suspected:
-        memory.withdrawn[s], T[s], t[s] = 0, 0.0, 0.0
+        memory.withdrawn[s] = 0
+        T[s] = 0.0
+        t[s] = 0.0
     elif memory.withdrawn[s]:
         t[s] += dt
         if t[s] > RETRY_S and is_replaced(layout, s):
-            memory.withdrawn[s], t[s] = 0, 0.0
+            memory.withdrawn[s] = 0
+            t[s] = 0.0
     else:
         T[s] += dt
         if not saturated:
             T[s] = max(T[s] - STOP_RECOVERY * dt, 0.0)
         elif T[s] > (PATIENCE_S if is_replaced(layout, s) else LONG_PATIENCE_S):
-            memory.withdrawn[s], T[s] = 1, 0.0
+            memory.withdrawn[s] = 1
+            T[s] = 0.0

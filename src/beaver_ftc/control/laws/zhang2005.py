@@ -57,7 +57,8 @@ def configure(law: np.void, control: np.void, prediction: np.void, declared: Dec
     published.configure(law["feedback"], control, prediction, declared, y)
     if not option["hand_over"]:
         control["config"]["reallocates"] = 0
-    Kp, Ki = settled.proportional_per_s, settled.integral_per_s2
+    Kp = settled.proportional_per_s
+    Ki = settled.integral_per_s2
     projects = option["projection"]
     fill(
         law["config"], adapts=option["adaptation"], networks=option["network"],
@@ -74,10 +75,14 @@ def configure(law: np.void, control: np.void, prediction: np.void, declared: Dec
 def accommodate(control, assessment, faults, prediction, measured):
     """Bring both parts, effectiveness and network, to this frame (control.CompiledLaw); they adapt while the
     alarm stands, if the option `adaptation` is set."""
-    law, surfaces, main, x = control.zhang2005, control.surfaces, control.layout.main, measured.x
+    law = control.zhang2005
+    surfaces = control.surfaces
+    main = control.layout.main
+    x = measured.x
     begin_frame(surfaces.output, False)
     if assessment.detected and law.config.adapts:
-        saturated, reference = control.allocation.output.saturated, control.reference
+        saturated = control.allocation.output.saturated
+        reference = control.reference
         wanted = reference.output.governed_rate
         adapt(law, surfaces, main, saturated, wanted, x, prediction.G, prediction.u, reference.config.dt)
     evaluate_state_network(law.network, main, x, measured.y, prediction.u)
@@ -94,7 +99,8 @@ def adapt(law, surfaces, main, saturated, wanted, x, G, u, dt):
     (3, n) rad/s2 per rad; u (n,) rad; gamma: config.gain, c: config.integral_weight. While the surface that
     leads an axis is at its stop, what the axis misses teaches nothing.
     """
-    config, signal = law.config, law.memory.signal
+    config = law.config
+    signal = law.memory.signal
     for i in range(3):
         signal[i] = -(wanted[i] - x[i] + config.integral_weight * law.feedback.memory.integral[i])
         if saturated[main[i]]:

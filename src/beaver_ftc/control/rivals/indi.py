@@ -38,7 +38,8 @@ class IncrementalInversion(KernelLaw):
 
     def compile_into(self, law: np.void) -> None:
         """Fill gains and filters; the filter of G u0 begins with what the leading surfaces give in trim."""
-        option, context = self.option, self.context
+        option = self.option
+        context = self.context
         fill(
             law["config"], incremental=1, keep=exp(-option["filter_per_s"] * context.dt_s),
             Kp=option["proportional_per_s"], Ki=option["integral_per_s2"],

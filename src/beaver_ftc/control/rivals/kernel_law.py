@@ -27,8 +27,10 @@ class KernelLaw:
 
     def reset(self, context: Context) -> None:
         """Prepare for a flight, in trim, with integrals of 0; `axes` (3,): surfaces that lead the axes."""
-        self.context, self.option = context, rival_options(self.name, self.defaults, context)
-        self.law, self.axes = np.zeros(1, rival_dtype(len(context.surfaces)))[0], np.array(context.leading)
+        self.context = context
+        self.option = rival_options(self.name, self.defaults, context)
+        self.law = np.zeros(1, rival_dtype(len(context.surfaces)))[0]
+        self.axes = np.array(context.leading)
         self.compile_into(self.law)
 
     def compile_into(self, law: np.void) -> None:
@@ -37,7 +39,8 @@ class KernelLaw:
 
     def step(self, measured: Measured, reference: Reference, verdict: Verdict) -> np.ndarray:
         """The command (surfaces,) rad, within the travel."""
-        context, wanted = self.context, self.context.trim_rad.copy()
+        context = self.context
+        wanted = self.context.trim_rad.copy()
         add_command(
             self.law, context.dt_s, reference.rate, reference.acceleration, self.axes, measured.x,
             measured.contribution, context.model.G(measured.y), np.zeros(3), wanted,

@@ -38,9 +38,11 @@ class Predictor:
     """The state predictor and its adaptation."""
 
     def __init__(self, pole_per_s: float, dt_s: float) -> None:
-        self._dt, self._decay = dt_s, exp(-pole_per_s * dt_s)
+        self._dt = dt_s
+        self._decay = exp(-pole_per_s * dt_s)
         self._Phi = (1.0 - self._decay) / pole_per_s
-        self.error, self.sigma = np.zeros(3), np.zeros(3)
+        self.error = np.zeros(3)
+        self.sigma = np.zeros(3)
 
     def step(self, dx: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
         """e <- A e + dt acceleration + Phi sigma - dx,    sigma = -A / Phi e; returns sigma (3,) rad/s2.
@@ -62,10 +64,13 @@ class L1Adaptive:
 
     def reset(self, context: Context) -> None:
         """Prepare for a flight: no error, and nothing unexplained yet."""
-        self.context, self.option = context, rival_options(self.name, self.defaults, context)
+        self.context = context
+        self.option = rival_options(self.name, self.defaults, context)
         self.predictor = Predictor(self.option["predictor_per_s"], context.dt_s)
         self.keep = exp(-self.option["bandwidth_per_s"] * context.dt_s)
-        self.compensated, self.integral, self.saturated = np.zeros(3), np.zeros(3), False
+        self.compensated = np.zeros(3)
+        self.integral = np.zeros(3)
+        self.saturated = False
         self.before: np.ndarray | None = None
 
     def step(self, measured: Measured, reference: Reference, verdict: Verdict) -> np.ndarray:
@@ -74,8 +79,11 @@ class L1Adaptive:
             sigma = self.predictor.step(measured.x - self.before, measured.acceleration)
             self.compensated = self.keep * self.compensated + (1.0 - self.keep) * sigma
         self.before = measured.x
-        context, leading, nu = self.context, list(self.context.leading), self.demand(measured.x, reference)
-        G, wanted = context.model.G(measured.y), context.trim_rad.copy()
+        context = self.context
+        leading = list(self.context.leading)
+        nu = self.demand(measured.x, reference)
+        G = context.model.G(measured.y)
+        wanted = context.trim_rad.copy()
         wanted[leading] = 0.0
         needed = nu - context.model.f(measured.x, measured.y) - self.compensated - G @ wanted
         wanted[leading] = np.linalg.solve(G[:, leading], needed)
@@ -86,7 +94,8 @@ class L1Adaptive:
     def demand(self, x: np.ndarray, reference: Reference) -> np.ndarray:
         """nu = xm' + Kp e_m + Ki int e_m (3,) rad/s2. The integral of the error does not change while a
         surface is at its stop."""
-        error, option = reference.rate - x, self.option
+        error = reference.rate - x
+        option = self.option
         if not self.saturated:
             self.integral = self.integral + self.context.dt_s * error
         following: np.ndarray = reference.acceleration + option["proportional_per_s"] * error

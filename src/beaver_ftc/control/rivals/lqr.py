@@ -44,7 +44,8 @@ class FixedGainLqr(KernelLaw):
 
         z[k+1] = ((I + dt A) z_1 + dt B du, z_2 + dt z_1)
         """
-        option, dt = self.option, self.context.dt_s
+        option = self.option
+        dt = self.context.dt_s
         A, B = linearised(self.context)
         z_A = np.block([[np.eye(3) + dt * A, np.zeros((3, 3))], [dt * np.eye(3), np.eye(3)]])
         z_B = np.vstack((dt * B, np.zeros((3, 3))))
@@ -58,7 +59,9 @@ class FixedGainLqr(KernelLaw):
 def linearised(context: Context) -> tuple[np.ndarray, np.ndarray]:
     """A (3, 3) 1/s and B (3, 3) rad/s2 per rad of the design model about the trim, with the air data
     constant; the columns of B are the surfaces that lead the axes."""
-    model, x, y = context.model, context.trim_x, context.trim_y
+    model = context.model
+    x = context.trim_x
+    y = context.trim_y
     steps = np.eye(3) * _STEP
     A = np.column_stack([(model.f(x + s, y) - model.f(x - s, y)) / (2.0 * _STEP) for s in steps])
     return A, model.G(y)[:, context.leading]

@@ -136,13 +136,15 @@ def compare_attitude(att, blocks, eta, x, dt, detected):
     eta (3,) rad/s2: bound of the uncertainty; x (3,) rad/s: measured rates. `score` and `gyro` are filled
     after an alarm of the rates, `detected`, or if a turn is beyond its level; else they are 0 and -1.
     """
-    pitch, lateral = blocks[PITCH_BLOCK], blocks[LATERAL_BLOCK]
+    pitch = blocks[PITCH_BLOCK]
+    lateral = blocks[LATERAL_BLOCK]
     block_of_axis = lateral, pitch, lateral
     sum_turns(att, x, dt)
     copy(att.s[:, 0, 1], att.xi)
     for i, blk in enumerate(block_of_axis):
         advance_axis(att, i, blk, BLOCK_ROWS[i], eta[i], dt, detected)
-    att.score, att.gyro = 0.0, -1
+    att.score = 0.0
+    att.gyro = -1
     worst = np.argmax(att.turn_score)
     if detected or att.turn_score[worst] > 1.0:
         att.score = max(largest_correlation(att, pitch, 1), largest_correlation(att, lateral, 0))
@@ -160,7 +162,8 @@ def advance_axis(att, i, blk, row, eta, dt, detected):
     M and N_j are added to once the rates have raised an alarm (`detected`). eta rad/s2: bound on the
     uncertainty of the axis.
     """
-    D, a_d = att.D[i, i], blk.a
+    D = att.D[i, i]
+    a_d = blk.a
     att.A[i] += att.turn[i]
     att.turn[i] = 0.0
     fill_inputs(att, i, blk, row, eta)
@@ -191,7 +194,8 @@ def fill_inputs(att, i, blk, row, eta):
     of the damping by the three rates. eta rad/s2: bound on the uncertainty; xi (3,) rad/s: of the frame
     before.
     """
-    u, tol = att.u, att.tol[i]
+    u = att.u
+    tol = att.tol[i]
     u[0] = -blk.nu[row]
     for j in range(blk.n_Z):
         u[1 + j] = blk.regressor[j, row]
@@ -287,7 +291,8 @@ def advance_P(att, i, blk, row, dt):
 
     Q_x (rad/s2)2, Q_d (rad/s2)2/s: noise of the rate and of the drift in the block; R rad2: variance of v.
     """
-    P, F_P = att.P[i], att.F_P
+    P = att.P[i]
+    F_P = att.F_P
     F = (1.0, dt, 0.0), (0.0, 1.0 - dt * att.D[i, i], dt), (0.0, 0.0, blk.a)
     for r in range(3):
         for c in range(3):

@@ -82,8 +82,11 @@ def configure_block(
     """
     n = len(axes)
     fill(b, n=n, a=1.0, Q_scale=1.0, n_h=len(entries), **others)
-    b["axes"][:n], b["m"][:n], b["R_y"][:n] = axes, m, R
-    b["P_xx"][:n, :n], b["P_dd"][:n, :n] = np.diag(R), DRIFT_PRIOR_RAD_S2**2 * np.eye(n)
+    b["axes"][:n] = axes
+    b["m"][:n] = m
+    b["R_y"][:n] = R
+    b["P_xx"][:n, :n] = np.diag(R)
+    b["P_dd"][:n, :n] = DRIFT_PRIOR_RAD_S2**2 * np.eye(n)
     for h, entry in zip(b["hypothesis"], entries, strict=False):
         fill(h, **entry._asdict())
         h["signature"][:n] = [entry.kind == STEP_FAULT and entry.axis == axis for axis in axes]

@@ -39,7 +39,8 @@ def set_directions(isolation, G):
     weakly.
     """
     for fie in isolation.estimator[: isolation.config.n_estimators]:
-        Gp, Gr = G[0, fie.surface], G[2, fie.surface]
+        Gp = G[0, fie.surface]
+        Gr = G[2, fie.surface]
         norm = np.hypot(Gp, Gr)
         if norm > 0.0:
             fie.parity_direction[0] = Gr / norm

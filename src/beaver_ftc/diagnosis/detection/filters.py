@@ -120,7 +120,10 @@ def update_bank(bank, bound, x, x_old, F, dt):
 
     e = T_eta + T_n; nu_max rad/s2: bound on nu without a fault, which is filled in `bound`.
     """
-    nu, E, T, e = bank.output.innovation, bank.output.residual, bank.output.threshold, bank.memory.e
+    nu = bank.output.innovation
+    E = bank.output.residual
+    T = bank.output.threshold
+    e = bank.memory.e
     for i in range(3):
         nu[i] = (x[i] - x_old[i]) / dt - F[i]
         bound.nu_max[i] = bound.eta_bar[i] + (bound.n_gyro[i] + bound.n_old[i]) / dt
@@ -170,11 +173,13 @@ def filter_share(bank, m, i):
 def nearest_filter(bank, i):
     """The filter whose |E| / T is largest on axis i; if there is an alarm on this axis, it is of this one.
     While no share is above ROUNDING_SHARE, it is filter 0."""
-    nearest, largest = 0, ROUNDING_SHARE
+    nearest = 0
+    largest = ROUNDING_SHARE
     for m in range(bank.config.n_filters):
         share = filter_share(bank, m, i)
         if share > largest:
-            nearest, largest = m, share
+            nearest = m
+            largest = share
     return nearest
 
 

@@ -27,9 +27,13 @@ def fill_angle_rates(forces, g, meas):
     a = meas.force
     V = meas.y[AIRSPEED]
     beta = meas.y[BETA]
-    p, q, r = meas.x[0], meas.x[1], meas.x[2]
-    phi, th = meas.attitude[0], meas.attitude[1]
-    c, s = np.cos(meas.y[ALPHA]), np.sin(meas.y[ALPHA])
+    p = meas.x[0]
+    q = meas.x[1]
+    r = meas.x[2]
+    phi = meas.attitude[0]
+    th = meas.attitude[1]
+    c = np.cos(meas.y[ALPHA])
+    s = np.sin(meas.y[ALPHA])
     a_x = a[0] - g * np.sin(th)
     a_y = a[1] + g * np.cos(th) * np.sin(phi)
     a_z = a[2] + g * np.cos(th) * np.cos(phi)

@@ -149,7 +149,8 @@ def _configure_columns(
         rows["Z"][first + len(tol), SIDE_FORCE + i] = 1.0 / declared.aircraft.geometry.chord_m
         tol.append(acc.steady)
     tol += [MASS_TOLERANCE + acc.slope, drift]
-    f["n_Z"], rows["tol"][first : first + len(tol)] = len(tol) - 1, tol
+    f["n_Z"] = len(tol) - 1
+    rows["tol"][first : first + len(tol)] = tol
 
 
 def _configure_vane(rows: np.void, f: np.void, slopes: np.ndarray, i: int) -> None:

@@ -71,7 +71,8 @@ def advance_interval(bank, fie, i, interval, dt):
 @kernel
 def advance_reach(bank, fie, dt):
     """Advance the reach of the fault in each filter by a frame of dt s, on each axis and along d."""
-    fault, d = fie.effect, fie.parity_direction
+    fault = fie.effect
+    d = fie.parity_direction
     for i in range(3):
         advance_interval(bank, fie, i, fault_range(fie, fault.h[i], fault.Z[i], fault.r[i]), dt)
     along = fault_range(fie, project(d, fault.h), project(d, fault.Z), project_size(d, fault.r))
@@ -93,7 +94,8 @@ def is_reachable(bank, fie, shared):
     """
     d = fie.parity_direction
     for m in range(bank.config.n_filters):
-        E, T = bank.output.residual[m], bank.output.threshold[m]
+        E = bank.output.residual[m]
+        T = bank.output.threshold[m]
         for i in range(3):
             if not (fie.skip[i] or within_reach(fie, m, i, E[i], T[i])):
                 return False

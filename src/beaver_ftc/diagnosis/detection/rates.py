@@ -89,7 +89,8 @@ def configure_rows(stat: np.void, errors: SensorErrors, tol: np.ndarray, err: np
     reading_tol = rows["tol"][n : n + N_INPUT_READINGS]
     sigma = noise["sigma"]
     for name, j in _READING_OF.items():
-        reading_tol[j], sigma[j] = errors[name].steady, errors[name].random
+        reading_tol[j] = errors[name].steady
+        sigma[j] = errors[name].random
     # kw0 bounds the whole error of the power, so the noise is that over the standard deviations in a bound.
     reading_tol[_KW_READING] = err["kw0"]
     sigma[_KW_READING] = err["kw0"] / NOISE_LIMIT_SIGMA

@@ -35,13 +35,15 @@ def configure_network(net: np.void, gain: float, w_max: float, travel: np.ndarra
     rad: lower and upper stop of the surfaces that lead roll, pitch and yaw.
     """
     cfg = net["config"]
-    cfg["gain"], cfg["w_max"] = gain, w_max
+    cfg["gain"] = gain
+    cfg["w_max"] = w_max
     for i in range(3):
         angles = ALPHA_CENTRES_RAD if i == PITCH else BETA_CENTRES_RAD
         deflections = travel[0, i] + TRAVEL_SHARE_CENTRES * (travel[1, i] - travel[0, i])
         inputs = angles, RATE_CENTRES_RAD_S, deflections
         first, second = np.transpose([centres[:2] for centres in inputs])
-        cfg["c0"][i], cfg["dc"][i] = first, second - first
+        cfg["c0"][i] = first
+        cfg["dc"][i] = second - first
 
 
 @kernel

@@ -180,7 +180,8 @@ def keep_score(alarm, share, axis, column):
     """Keep a score over the alarm level in its column, and with its axis if it is the largest of all."""
     alarm.share[column] = max(alarm.share[column], share)
     if share > alarm.ratio:
-        alarm.ratio, alarm.axis = share, axis
+        alarm.ratio = share
+        alarm.axis = axis
 
 
 @kernel
@@ -271,7 +272,8 @@ def estimate_loss(blocks, s):
     for b in blocks:
         for h in b.hypothesis[: b.n_h]:
             if h.kind == LOSS and h.surface == s and h.D > D:
-                th, D = h.th, h.D
+                th = h.th
+                D = h.D
     return th, D
 
 

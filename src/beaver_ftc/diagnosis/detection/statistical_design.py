@@ -93,7 +93,8 @@ def configure_statistics(fdi: np.void, declared: Declared, model: np.void, trim:
     views = list(directions) if declared.compares_across else []
     n_tests = count_tests(declared.aircraft, *views)
     _configure_levels(stat["test"], declared, settings, n_tests)
-    level, margin = float(stat["test"]["alarm_level"]), float(stat["test"]["margin"])
+    level = float(stat["test"]["alarm_level"])
+    margin = float(stat["test"]["margin"])
     configure_gust(gust, declared)
     configure_gust_speed(gust, declared, level, V)
     tol = coefficient_bounds(declared, model, y, u)

@@ -156,7 +156,8 @@ def bound_coefficients(t, tol, n_Z):
     t.e_R[:] = 0.0
     for j in range(n_Z):
         for k in range(t.e_R.size):
-            x, y = abs(t.R[j, k].real), abs(t.R[j, k].imag)
+            x = abs(t.R[j, k].real)
+            y = abs(t.R[j, k].imag)
             t.e_R[k] += tol[j] * (max(x, y) + SQRT2_LESS_1 * min(x, y))
 
 

@@ -60,9 +60,12 @@ def invert_symmetric(n, S):
     if n == 1:
         S[0, 0] = 1.0 / S[0, 0]
         return
-    a, c, d = S[0, 0], 0.5 * (S[0, 1] + S[1, 0]), S[1, 1]
+    a = S[0, 0]
+    c = 0.5 * (S[0, 1] + S[1, 0])
+    d = S[1, 1]
     det = a * d - c * c
-    S[0, 0], S[1, 1] = d / det, a / det
+    S[0, 0] = d / det
+    S[1, 1] = a / det
     S[0, 1] = S[1, 0] = -c / det
 
 
@@ -75,7 +78,10 @@ def predict_covariance(b, dt):
     `S_inv` is filled with S, which `invert_symmetric` inverts next. The order matters: P_xx needs P_xd and
     P_dd of before, and P_xd needs P_dd of before.
     """
-    P_xx, P_xd, P_dd, S = b.P_xx, b.P_xd, b.P_dd, b.S_inv
+    P_xx = b.P_xx
+    P_xd = b.P_xd
+    P_dd = b.P_dd
+    S = b.S_inv
     for i in range(b.n):
         for j in range(b.n):
             P_xx[i, j] += dt * (P_xd[i, j] + P_xd[j, i]) + dt * dt * P_dd[i, j]
@@ -112,16 +118,20 @@ def fill_kalman_gains(b):
             for k in range(b.n):
                 K_x += b.P_xx[i, k] * b.S_inv[k, j]
                 K_d += b.P_xd[k, i] * b.S_inv[k, j]
-            b.K_x[i, j], b.K_d[i, j] = K_x, K_d
+            b.K_x[i, j] = K_x
+            b.K_d[i, j] = K_d
 
 
 @kernel
 def update_covariance(b):
     """Update the covariances for the measurement: P <- P - K S K'."""
-    K_x, K_d = b.K_x, b.K_d
+    K_x = b.K_x
+    K_d = b.K_d
     for j in range(2):  # a column follows from itself alone
-        xx_0, xx_1 = b.P_xx[0, j], b.P_xx[1, j]
-        xd_0, xd_1 = b.P_xd[0, j], b.P_xd[1, j]
+        xx_0 = b.P_xx[0, j]
+        xx_1 = b.P_xx[1, j]
+        xd_0 = b.P_xd[0, j]
+        xd_1 = b.P_xd[1, j]
         for i in range(b.n):
             b.P_dd[i, j] -= K_d[i, 0] * xd_0 + K_d[i, 1] * xd_1
             b.P_xx[i, j] -= K_x[i, 0] * xx_0 + K_x[i, 1] * xx_1

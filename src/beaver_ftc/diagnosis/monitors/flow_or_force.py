@@ -170,7 +170,8 @@ def sum_flow(mon, y):
             f.r_sum += mon.residual[j]
             f.B_sum += mon.h * mon.per_s[j]
             f.H_sum += mon.initial.E_alarm[n] * mon.initial.H[n, j]
-            f.y_min, f.y_max = min(f.y_min, reading), max(f.y_max, reading)
+            f.y_min = min(f.y_min, reading)
+            f.y_max = max(f.y_max, reading)
     f = mon.flow[ALPHA_TEST - SPEED_TEST]
     explained = f.B_sum + f.H_sum
     alpha = f.r_sum - min(max(f.r_sum, -explained), explained)

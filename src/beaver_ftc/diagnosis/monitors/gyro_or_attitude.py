@@ -86,7 +86,8 @@ def advance_gyro_estimate(mon, nu, eta, dt):
     """
     w = mon.w
     B = mon.w_bound
-    w0, B0 = components(vector(w)), components(vector(B))
+    w0 = components(vector(w))
+    B0 = components(vector(B))
     for i in range(3):
         w[i] = dt * nu[i]
         B[i] = dt * eta[i]
@@ -106,10 +107,14 @@ def follow_gyro_errors(mon):
         if mon.substep == 0:
             g.shown_past = g.shown
             g.shown = w
-            g.most_older, g.most_past, g.most = g.most_past, g.most, 0.0
-            g.least_past, g.least = g.least, np.inf
+            g.most_older = g.most_past
+            g.most_past = g.most
+            g.most = 0.0
+            g.least_past = g.least
+            g.least = np.inf
         else:
-            g.most, g.least = max(g.most, abs(w)), min(g.least, abs(w))
+            g.most = max(g.most, abs(w))
+            g.least = min(g.least, abs(w))
 
 
 @kernel

@@ -130,7 +130,11 @@ def bound_attitude(mon, y, w_max, e_w):
     and theta in the sample, rad; momentary: bounds on the changing errors of theta and psi, in the sample
     before and now, rad; coupled_i: turn about axis i by a momentary error of psi or theta, rad.
     """
-    h, e, n, past, const = mon.h, mon.e_past, mon.n, mon.y_past, mon.const
+    h = mon.h
+    e = mon.e_past
+    n = mon.n
+    past = mon.y_past
+    const = mon.const
     sec = secant(highest(mon, y, THETA))
     turn = h * w_max
     tilt = abs(y[PHI] - past[PHI]) + abs(y[THETA] - past[THETA])

@@ -65,7 +65,8 @@ def rival_options(name: str, defaults: Mapping[str, float], context: Context) ->
     for option in context.options:
         if option not in defaults:
             raise BadInput(f"{name}: options.{option}: unknown option{suggestion(option, defaults)}")
-    declared, options = context.declared, dict(defaults)
+    declared = context.declared
+    options = dict(defaults)
     has_ideal_actuators = not declared.bandwidth_rad_s.any() and not declared.rate_limit_rad_s.any()
     grade = flight_grade(declared.noisy, has_ideal_actuators)
     for group in TUNED_FILE_KEY_BY_PLUGIN_GROUP:

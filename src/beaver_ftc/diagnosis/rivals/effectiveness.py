@@ -99,7 +99,8 @@ class AugmentedEkf(EffectivenessFilter):
 
     def predict(self, measured: Measured, before: Measured) -> None:
         """z- = F z + dt (xdot - J x), P- = F P F' + Q; J = df/dx at x, measured in the frame before."""
-        F, x = self.transition(measured), before.x
+        F = self.transition(measured)
+        x = before.x
         f = self.context.model.f(x + _STEPS, before.y)
         J = (f[:3] - f[3:]).T / (2.0 * _STEP_RAD_S)
         F[:3, :3] += self.dt * J

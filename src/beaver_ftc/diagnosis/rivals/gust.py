@@ -43,7 +43,8 @@ class VaneGust:
     def __init__(self, context: Context) -> None:
         declared = context.declared
         self._dt = context.dt_s
-        self._effect, self._lag_s = declared.gust_effect, declared.gust_time_s
+        self._effect = declared.gust_effect
+        self._lag_s = declared.gust_time_s
         self._airspeed = float(context.trim_y[AIRSPEED])
         self._rotation = np.zeros(3)  # of the air: (0, q_g, r_g) rad/s, in level axes
         self._expected: np.ndarray | None = None  # velocity now in still air, in the level axes of _heading
@@ -62,10 +63,13 @@ class VaneGust:
 
         Those of beta, psi and a_y take the place of alpha, theta and a_z in that of r_g.
         """
-        declared, V = context.declared, self._airspeed
+        declared = context.declared
+        V = self._airspeed
         air = np.hypot(declared.noise[3:], declared.resolution[3:] / np.sqrt(12.0))
         further = np.hypot(declared.further_noise, declared.further_resolution / np.sqrt(12.0))
-        phi, theta_psi, az_ay = further[0], further[1:3], further[_AZ_AY]
+        phi = further[0]
+        theta_psi = further[1:3]
+        az_ay = further[_AZ_AY]
         angles = np.hypot(air[:2], theta_psi) + _TURNED_SHARE * (air[2] / V + phi) + az_ay * self._dt / V
         rotation = angles / self._lag_s[_MEASURED]
         of_level_axes = self._effect @ _level_axes(0.0, float(context.trim_y[0])).T  # straight and level
@@ -88,9 +92,12 @@ class VaneGust:
         V = max(V, _LEAST_AIRSPEED_MPS)
         to_level = _level_axes(phi, theta)
         flow = np.array([cos(alpha) * cos(beta), sin(beta), sin(alpha) * cos(beta)])
-        velocity, force = V * (to_level @ flow), to_level @ measured.force
-        expected, turn = self._expected, psi - self._heading
-        self._expected, self._heading = velocity + self._dt * (force + _GRAVITY), psi
+        velocity = V * (to_level @ flow)
+        force = to_level @ measured.force
+        expected = self._expected
+        turn = psi - self._heading
+        self._expected = velocity + self._dt * (force + _GRAVITY)
+        self._heading = psi
         if expected is None:
             return measured
         # The rotation at the beginning of the frame, in the body axes of its end: the same to first order.

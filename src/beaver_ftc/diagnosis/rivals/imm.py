@@ -82,7 +82,8 @@ class InteractingMultipleModels(KalmanRival):
         self.chain = transition_matrix(self.options["stay"], N_MODES)
         self.mu = np.full(N_MODES, _MIN_MODE_PROBABILITY)
         self.mu[0] = 1.0 - (N_MODES - 1) * _MIN_MODE_PROBABILITY
-        self.z, self.P = np.zeros((N_MODES, self.n)), np.tile(self.P, (N_MODES, 1, 1))
+        self.z = np.zeros((N_MODES, self.n))
+        self.P = np.tile(self.P, (N_MODES, 1, 1))
         self.noise = np.full(N_MODES, self.options["noise"])
         self.noise[-1] = self.options["unknown_noise"]
 
@@ -107,7 +108,8 @@ class InteractingMultipleModels(KalmanRival):
         modes of one surface together at least `isolate`   this surface, with their mean theta
         otherwise                                          candidates: surfaces above 1 - `isolate`
         """
-        level, levels = self.options["isolate"], self.mu[1:-1].reshape(3, N_LEVELS)
+        level = self.options["isolate"]
+        levels = self.mu[1:-1].reshape(3, N_LEVELS)
         if self.mu[-1] > level:
             return UNANTICIPATED
         lost = levels.sum(axis=1)

@@ -38,16 +38,20 @@ class KalmanRival(RivalDetector):
 
     def fill_model(self, n_theta: int = 0, theta_variance: float = 0.0, walk: float = 0.0) -> None:
         """Fill the model, and start healthy. theta_variance: at the start; walk: variance of a frame."""
-        declared, n_air = self.context.declared, 3 if self.context.declared.air else 0
+        declared = self.context.declared
+        n_air = 3 if self.context.declared.air else 0
         a = np.exp(-self.dt / declared.gust_time_s[:n_air])
         gust_variance = declared.gust_rad_s[:n_air] ** 2
         rate_variance = declared.rate_variance(self.options["measurement_rad_s"])
-        self.n_air, self.n = n_air, 3 + n_theta + n_air
-        self.F, air = np.eye(self.n), slice(3 + n_theta, None)
+        self.n_air = n_air
+        self.n = 3 + n_theta + n_air
+        self.F = np.eye(self.n)
+        air = slice(3 + n_theta, None)
         self.F[:3, air] = self.dt * declared.gust_effect[:, :n_air]
         self.F[air, air] = np.diag(a)
         self.q = np.concatenate((np.zeros(3), np.full(n_theta, walk), (1.0 - a**2) * gust_variance))
-        self.R, self.before = np.diag(rate_variance), None
+        self.R = np.diag(rate_variance)
+        self.before = None
         self.own_bound = np.hypot(self.context.constant_rad_s2, declared.model_rad_s2)
         self.P = np.diag(np.concatenate((rate_variance, np.full(n_theta, theta_variance), gust_variance)))
         self.z = np.zeros(self.n)

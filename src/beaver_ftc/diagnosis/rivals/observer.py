@@ -34,7 +34,8 @@ _N_AXES = 3
 
 def healthy_residual_std(context: Context, a: float) -> np.ndarray:
     """Standard deviation (3,) rad/s of the healthy residual behind the filter, by what is declared."""
-    declared, dt = context.declared, context.dt_s
+    declared = context.declared
+    dt = context.dt_s
     r = np.exp(-dt / np.maximum(declared.turbulence_time_s, dt))
     by_air = declared.turbulence_rad_s2 * np.sqrt((1.0 + a * r) / ((1.0 - a * a) * (1.0 - a * r)))
     bound = np.maximum(context.constant_rad_s2, _LEAST_BOUND_RAD_S2)
@@ -58,14 +59,17 @@ class ConstantThresholdObserver(RivalDetector):
 
     def start(self) -> None:
         """Start with residuals of zero."""
-        pole, context = self.options["pole_per_s"], self.context
+        pole = self.options["pole_per_s"]
+        context = self.context
         self.a = exp(-pole * self.dt)
         level = np.maximum(context.constant_rad_s2, _LEAST_BOUND_RAD_S2) / pole
         if context.declared.errors:
             level = healthy_residual_std(context, self.a)
         self.threshold = self.options["alarm"] * level
         self.fade = exp(-self.dt / self.options["window_s"])
-        self.filtered, self.sums, self.weight = np.zeros((3, 5)), np.zeros((4, 4)), 0.0
+        self.filtered = np.zeros((3, 5))
+        self.sums = np.zeros((4, 4))
+        self.weight = 0.0
         self.previous: np.ndarray | None = None
         self.verdict = Verdict()
 
@@ -99,7 +103,8 @@ class ConstantThresholdObserver(RivalDetector):
         scaled = self.filtered[:, 1:] / self.threshold[:, None]
         self.sums = self.fade * self.sums + scaled.T @ scaled
         self.weight = self.fade * self.weight + 1.0
-        N, M = self.sums[0, 1:], np.diagonal(self.sums)[1:]
+        N = self.sums[0, 1:]
+        M = np.diagonal(self.sums)[1:]
         theta = np.clip(N / np.maximum(M, _TINY), -1.0, 0.0)
         misfit = self.sums[0, 0] - 2.0 * theta * N + theta**2 * M
         s = int(np.argmin(misfit))

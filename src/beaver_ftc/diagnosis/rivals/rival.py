@@ -28,10 +28,13 @@ class RivalDetector:
     def reset(self, context: Context) -> None:
         """Prepare for a flight. Where vanes measure the gust, `step` subtracts its effect from the
         innovation. The context of the detector then declares only the rest of the turbulence."""
-        self.options, self.vane_gust = rival_options(self.name, self.defaults, context), VaneGust(context)
-        self.context, self.dt = self.vane_gust.context, context.dt_s
+        self.options = rival_options(self.name, self.defaults, context)
+        self.vane_gust = VaneGust(context)
+        self.context = self.vane_gust.context
+        self.dt = context.dt_s
         self.leading = list(context.leading)
-        self.alarm_s, self.alarm_axis = np.inf, 0
+        self.alarm_s = np.inf
+        self.alarm_axis = 0
         self.start()
 
     def step(self, measured: Measured, command: np.ndarray) -> Verdict:
@@ -40,7 +43,8 @@ class RivalDetector:
         statistics = np.atleast_1d(self.advance(measured, command))
         statistic = float(statistics.max())
         if statistic > 1.0 and self.alarm_s == np.inf:
-            self.alarm_s, self.alarm_axis = measured.t_s, int(statistics.argmax())
+            self.alarm_s = measured.t_s
+            self.alarm_axis = int(statistics.argmax())
             self.begin_isolation()
         verdict = Verdict() if self.alarm_s == np.inf else self.isolate(measured)
         return verdict._replace(statistic=statistic)

@@ -28,8 +28,10 @@ class RecursiveLeastSquaresFit:
     """
 
     def __init__(self, n: int, lam: float, prior: float) -> None:
-        self.weights, self.P = np.zeros(n), np.eye(n) * prior
-        self._lam, self._prior = lam, prior
+        self.weights = np.zeros(n)
+        self.P = np.eye(n) * prior
+        self._lam = lam
+        self._prior = prior
 
     def step(self, phi: np.ndarray, y: float) -> float:
         """Update w and P by one sample; return y - w' phi with the w before it, in the unit of y."""
@@ -54,7 +56,8 @@ class InputOutputPredictionTest:
         self._fade = fade
         self._least = least
         self._phi = np.array([0.0, 0.0, 0.0, 0.0, 1.0])
-        self.mean, self.variance = 0.0, 0.0
+        self.mean = 0.0
+        self.variance = 0.0
 
     def step(self, u: float, y: float) -> float:
         """Return |z| of the output y, with mean m and variance v before it; then update the model, m and v:

@@ -57,7 +57,9 @@ def configure_diagnosis(fdi: np.void, pred: np.void, declared: Declared, travel:
 
     Raises BadInput if pairs are asked for and the declared errors of the sensors do not allow them.
     """
-    config, aircraft, dt = declared.fdi, declared.aircraft, 1.0 / declared.rate_hz
+    config = declared.fdi
+    aircraft = declared.aircraft
+    dt = 1.0 / declared.rate_hz
     rows = isolation.list_estimators(config.fault_class, aircraft)
     state.configure_shared(fdi["config"], declared)
     state.configure_layout(fdi["layout"], rows, aircraft)
@@ -94,7 +96,8 @@ def detection_share(fdi):
     Of two detectors, the worst-case one counts beyond its bound only: it has no rate of false alarms that a
     lower level could trade for power.
     """
-    stat, authority = fdi.statistical, fdi.config.authority
+    stat = fdi.statistical
+    authority = fdi.config.authority
     share = 0.0 if authority == STATISTICAL_DETECTOR else bank_share(fdi.bank)
     if not weighs_statistics(stat, authority):
         return share
@@ -147,7 +150,8 @@ def accumulate_substep(fdi, prediction, measured):
 
 def kernels_of_scheme(fdi: np.void) -> Iterator[Any]:
     """The kernels that a flight of one instant a frame compiles apart, of its scheme."""
-    cfg, ours = fdi["config"], adaptive_estimators
+    cfg = fdi["config"]
+    ours = adaptive_estimators
     scheme = cfg["scheme_number"]
     yield begin_scheme
     if scheme == PUBLISHED_SCHEME:

@@ -38,10 +38,12 @@ def update_estimators(fdi, pred):
 
     With a broken sensor they stay as they are: the reading that replaces it follows from the design model.
     """
-    cfg, iso, bound, means, detected = fdi.config, fdi.isolation, fdi.bound, pred.means, fdi.verdict.detected
-    isolation.update_effects(iso, fdi.bank, bound, cfg, detected, means.G, means.Gu, means.e_Gu)
+    iso = fdi.isolation
+    means = pred.means
+    detected = fdi.verdict.detected
+    isolation.update_effects(iso, fdi.bank, fdi.bound, fdi.config, detected, means.G, means.Gu, means.e_Gu)
     if detected and not sensor_monitor.has_alarm(fdi.sensor_monitor):
-        estimators.advance_estimators(iso, bound, pred.x_before, means.F, cfg.dt)
+        estimators.advance_estimators(iso, fdi.bound, pred.x_before, means.F, fdi.config.dt)
 
 
 @kernel
@@ -76,7 +78,8 @@ def continue_isolation(fdi, meas, t, before):
 @apart(long_loops=True)
 def weigh_loss(fdi, j):
     """Fill `unlikely` of estimator j: whether the statistical detector excludes its loss, after its alarm."""
-    stat, iso = fdi.statistical, fdi.isolation
+    stat = fdi.statistical
+    iso = fdi.isolation
     if stat.alarm.detected_at_s >= 0.0:
         hidden = fdi.sensor_monitor.config.enabled and stat.gust.output.gusty
         isolation.update_likelihood(
@@ -87,9 +90,9 @@ def weigh_loss(fdi, j):
 @apart(long_loops=True)
 def weigh_position(fdi, j):
     """Fill `unlikely` of estimator j by the parity views."""
-    stat, fies = fdi.statistical, fdi.isolation.estimator
+    fies = fdi.isolation.estimator
     G = fies[fdi.layout.position[fies[j].surface]].effect.Z
-    isolation.weigh_views(fies[j], stat, G)
+    isolation.weigh_views(fies[j], fdi.statistical, G)
 
 
 @kernel
@@ -101,9 +104,9 @@ def exclude_or_wait(fdi, fie, possible, t):
     alarm, an exclusion is only pending.
     """
     if not possible or fie.pending:
-        monitor, isolated = fdi.sensor_monitor, fdi.verdict.from_s[fie.surface] >= 0.0
-        in_doubt = sensor_monitor.doubts_gyros(monitor)
-        isolation.exclude_fault(fie, t, monitor.config.enabled and isolated, in_doubt)
+        monitor = fdi.sensor_monitor
+        waits = monitor.config.enabled and fdi.verdict.from_s[fie.surface] >= 0.0
+        isolation.exclude_fault(fie, t, waits, sensor_monitor.doubts_gyros(monitor))
 
 
 @kernel
@@ -111,9 +114,11 @@ def isolate(fdi, meas, t, before):
     """Exclude faults at t s, and decide; before: whether the alarm came a frame or more ago. If only
     the exclusions of the statistical detector count, the worst case excludes nothing. While a gyro may be the
     cause of the alarm, nothing is decided."""
-    cfg, iso, bank = fdi.config, fdi.isolation, fdi.bank
+    cfg = fdi.config
+    iso = fdi.isolation
+    nu_max = fdi.bound.nu_max
     for j, fie in enumerate(iso.estimator[: iso.config.n_estimators]):
-        possible = isolation.fault_possible(iso, fie, bank, fdi.bound.nu_max, cfg.abrupt, meas.x, before)
+        possible = isolation.fault_possible(iso, fie, fdi.bank, nu_max, cfg.abrupt, meas.x, before)
         possible = possible or cfg.exclusion_authority == STATISTICAL_DETECTOR
         if possible and cfg.exclusion_authority != WORST_CASE_DETECTOR:
             if cfg.diagnoses_all_types:
@@ -133,21 +138,22 @@ def decide_type(fdi, t, before):
     """Examine the frame, in the frame of the alarm only with pairs or `reach`. Then decide on which
     surface, or two of them, there is a fault, and of which type, unless a gyro may be the cause of the alarm.
     """
-    types, concluded, layout, bank = fdi.types, fdi.verdict, fdi.layout, fdi.bank
-    fies, bound = fdi.isolation.estimator, fdi.bound
+    types = fdi.types
+    layout = fdi.layout
+    fies = fdi.isolation.estimator
     for s, srf in enumerate(types.surface):
         srf.not_at_position = fies[layout.position[s]].excluded
     if types.pair.enabled:
-        pairs.observe_pairs(types, layout, fies, bank, bound.nu_max)
+        pairs.observe_pairs(types, layout, fies, fdi.bank, fdi.bound.nu_max)
     elif before or fdi.isolation.config.reach:
-        examination.observe_frame(types, layout, fies, bank.output.innovation, bound)
+        examination.observe_frame(types, layout, fies, fdi.bank.output.innovation, fdi.bound)
     if sensor_monitor.doubts_gyros(fdi.sensor_monitor):
         return
     if types.pair.enabled:
-        finding = pairs.decide_pairs(types, concluded, layout, t)
+        finding = pairs.decide_pairs(types, fdi.verdict, layout, t)
     else:
-        finding = verdict.decide_single(types, concluded, layout, t)
-    conclusion.record_decision(concluded, finding, modes.accommodate(types, layout))
+        finding = verdict.decide_single(types, fdi.verdict, layout, t)
+    conclusion.record_decision(fdi.verdict, finding, modes.accommodate(types, layout))
 
 
 @apart
@@ -166,7 +172,7 @@ def record_orders(fdi, prediction):
 @apart
 def advance_estimators_to_frame(fdi, prediction, measured, k, t):
     """Bring bank, likelihoods, isolation and FDAE to this frame."""
-    concluded, bound, dt = fdi.verdict, fdi.bound, fdi.config.dt
+    concluded = fdi.verdict
     update_filters(fdi, prediction, measured)
     if fdi.statistical.test.enabled:
         update_tests(fdi, prediction, measured, k, t)
@@ -174,8 +180,10 @@ def advance_estimators_to_frame(fdi, prediction, measured, k, t):
     if fdi.config.diagnoses_all_types:
         record_orders(fdi, prediction)
     leaks = concluded.isolated_estimator >= 0 or concluded.target >= 0
-    x, F = prediction.x_before, prediction.F_known
-    fdae.advance_fdae(fdi.fdae, fdi.bank, bound, x, F, concluded.detected, leaks, dt)
+    fdae.advance_fdae(
+        fdi.fdae, fdi.bank, fdi.bound, prediction.x_before, prediction.F_known, concluded.detected, leaks,
+        fdi.config.dt,
+    )  # fmt: skip
 
 
 @apart

@@ -27,7 +27,9 @@ def record_isolated_surfaces(fdi, t):
     """Record at t s which surfaces are isolated, and the type of each: where pairs are diagnosed, as their
     status says, else the one surface of the conclusion; none (`void`) once a sensor is found broken, unless
     the monitor keeps the surface."""
-    concluded, monitor, pairs = fdi.verdict, fdi.sensor_monitor, fdi.types.pair.enabled
+    concluded = fdi.verdict
+    monitor = fdi.sensor_monitor
+    pairs = fdi.types.pair.enabled
     void = sensor_monitor.has_alarm(monitor) and not monitor.output.keeps_surface
     sole = isolated_surface(concluded, fdi.isolation.estimator)
     for s, srf in enumerate(fdi.types.surface):
@@ -50,7 +52,8 @@ def reason_of_withdrawal(fdi, s, isolated):
                         longer isolated) remains
     SEVERAL_POSSIBLE    otherwise
     """
-    cfg, srf = fdi.config, fdi.types.surface[s]
+    cfg = fdi.config
+    srf = fdi.types.surface[s]
     j = fdi.layout.position[s] if cfg.diagnoses_all_types else fdi.layout.loss[s]
     if cfg.scheme_number == PLUGIN_SCHEME:
         return PLUGIN_DECIDES

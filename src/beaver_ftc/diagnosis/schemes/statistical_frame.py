@@ -26,7 +26,9 @@ def update_tests(fdi, prediction, measured, k, t):
     """Test the innovation of the elapsed frame, which ends at frame k, t s, for every hypothesis: in the
     blocks of the rates, against the attitude, and in the parity views. Then update the alarm, and filter for
     the law the innovation after known faults."""
-    stat, y, dt = fdi.statistical, measured.y, fdi.config.dt
+    stat = fdi.statistical
+    y = measured.y
+    dt = fdi.config.dt
     alarmed = stat.alarm.detected_at_s >= 0.0
     fill_rows(fdi, prediction, y)
     statistical.update_blocks(stat, dt, k, alarmed, not fdi.config.abrupt)
@@ -41,7 +43,9 @@ def update_tests(fdi, prediction, measured, k, t):
 @kernel
 def fill_rows(fdi, prediction, y):
     """Finish the gust estimates of the elapsed frame, and fill the rows that blocks and views read."""
-    stat, means, nu = fdi.statistical, prediction.means, fdi.bank.output.innovation
+    stat = fdi.statistical
+    means = prediction.means
+    nu = fdi.bank.output.innovation
     gusts.finish_gust(stat.gust, prediction.w)
     for gust in (stat.vaneless, stat.vaned):
         if gust.output.gusty:
@@ -57,7 +61,9 @@ def fill_rows(fdi, prediction, y):
 def compare_attitude(fdi, x):
     """Compare the turn of the attitude with the measured rates x, rad/s. After an alarm, if the attitude
     turns as well (score above 1), no gyro is the cause."""
-    stat, att, detected = fdi.statistical, fdi.statistical.attitude, fdi.verdict.detected
+    stat = fdi.statistical
+    att = stat.attitude
+    detected = fdi.verdict.detected
     attitude.compare_attitude(att, stat.block, stat.rows.eta[0, :3], x, fdi.config.dt, detected)
     if detected and att.score > 1.0:
         gyro_or_attitude.rule_out_gyros(fdi.sensor_monitor)
@@ -67,7 +73,8 @@ def compare_attitude(fdi, x):
 def prepare_gusts(fdi, prediction, measured, k):
     """Prepare the tests of the frame after frame k: gust estimates, rows of the forces, noise,
     coefficients."""
-    stat, dt = fdi.statistical, fdi.config.dt
+    stat = fdi.statistical
+    dt = fdi.config.dt
     update_gusts(stat, fdi.bound.declared_errors.du, prediction, measured, k, dt)
     statistical.prepare_tests(stat, fdi.bound, prediction.design, measured, prediction.u, dt)
 
@@ -84,7 +91,10 @@ def add_gust_instant(fdi, prediction, measured):
 def update_gusts(stat, du, pred, meas, k, dt):
     """Update the gust estimates, and the rows of the forces. If the inertial readings cannot be trusted, stop
     using accelerometers. du (n,) rad: errors of the deflections. k: number of the frame; dt s."""
-    gust, vaneless, vaned, force = stat.gust, stat.vaneless, stat.vaned, stat.forces
+    gust = stat.gust
+    vaneless = stat.vaneless
+    vaned = stat.vaned
+    force = stat.forces
     if gust.output.gusty:
         gusts.set_intensity(gust, meas.altitude)
         gusts.step_gust(gust, meas.y, meas.attitude, pred.w * dt, k)

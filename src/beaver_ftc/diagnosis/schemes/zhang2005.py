@@ -49,9 +49,11 @@ PUBLISHED_RECORD = record(config=record(waits=int, mu0=float), network=STATE_NET
 def reconfigure(fdi: np.void, declared: Declared, travel: np.ndarray) -> None:
     """Turn the stages of a diagnosis, which are filled in already, into this scheme, with its options; travel
     (2, n) rad: the stops."""
-    config, dt = declared.fdi, 1.0 / declared.rate_hz
+    config = declared.fdi
+    dt = 1.0 / declared.rate_hz
     options = settings(DETECTORS, config.scheme, config.options)
-    scheme, isolation = fdi["published"], fdi["isolation"]
+    scheme = fdi["published"]
+    isolation = fdi["isolation"]
     limit = options["network_limit_rad_s2"] if options["projection"] else np.inf
     configure_network(scheme["network"], options["network_gain"], limit, travel[:, fdi["layout"]["main"]])
     scheme["config"]["waits"] = options["dead_zone"]
@@ -100,11 +102,14 @@ def advance_estimators_to_frame(fdi, prediction, measured):
     The network learns from residual, threshold and basis of the frame before, and xhat0 moves with the output
     that `update_verdict` computed there. The network of fdae.py itself never learns (detected: False).
     """
-    pub, dt, mu = fdi.published, fdi.config.dt, fdi.published.config.mu0
+    pub = fdi.published
+    dt = fdi.config.dt
+    mu = pub.config.mu0
     adaptive_estimators.update_filters(fdi, prediction, measured)
     adaptive_estimators.update_estimators(fdi, prediction)
     train_if_due(pub, fdi.fdae, fdi.verdict.detected, dt)
-    x, F = prediction.x_before, prediction.means.F
+    x = prediction.x_before
+    F = prediction.means.F
     advance_fdae(fdi.fdae, fdi.bank, fdi.bound, x, F, False, False, dt)
     if mu > 0.0:
         fdi.fdae.output.threshold[:] = fdi.bank.output.threshold[0] = mu

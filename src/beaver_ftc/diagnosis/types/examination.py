@@ -42,9 +42,13 @@ def restart_surface(srf):
     """Restart the diagnosis of one surface: every type remains, with its whole range, and no evidence counts.
     The observations and released types stay, until the next frames replace them."""
     srf.sets.excluded[:] = 0
-    srf.last.lo, srf.last.hi = srf.actuator.reach_lo, srf.actuator.reach_hi
+    srf.last.lo = srf.actuator.reach_lo
+    srf.last.hi = srf.actuator.reach_hi
     ev = srf.evidence
-    ev.k_first, ev.n_anomalous, ev.n_rest, ev.n_unhidden = -1, 0, 0, 0
+    ev.k_first = -1
+    ev.n_anomalous = 0
+    ev.n_rest = 0
+    ev.n_unhidden = 0
     for h in range(N_TYPES):
         put_set(srf, h, parameter_range(h, srf, h))
         reset_memory(h, srf, h)
@@ -56,7 +60,8 @@ def observe_surfaces(types, layout, est, nu, nu_max):
     """Find where each surface was in the elapsed frame, or block, if it alone is at fault."""
     anomalous = not estimators.eta_explains(nu, nu_max)
     for s, srf in enumerate(types.surface):
-        fie, axis = est[layout.position[s]], layout.dominant_axis[s]
+        fie = est[layout.position[s]]
+        axis = layout.dominant_axis[s]
         eff = fie.mean_effect if types.config.frames_per_block > 1 else fie.effect
         observe_surface(types.config, srf, fie, axis, nu, nu_max, eff, anomalous)
 
@@ -71,11 +76,14 @@ def count_anomaly(srf):
 @kernel
 def judge_types(c, srf, k):
     """Test every type of one surface with the judged frame, in which something was wrong."""
-    ev, judged = srf.evidence, srf.judged
+    ev = srf.evidence
+    judged = srf.judged
     if judged.lo > judged.hi:  # no position explains the frame: this refutes the surface, and no single type
         return
     if ev.k_first < 0:
-        (ev.k_first, ev.first_lo, ev.first_hi) = (k, judged.lo, judged.hi)
+        ev.k_first = k
+        ev.first_lo = judged.lo
+        ev.first_hi = judged.hi
     for h in range(N_TYPES):
         if HOLDS[h]:
             intersect_set(srf, h, release.held_set(c, srf, h, *deflection_range(h, c, srf, h, k)))
@@ -109,8 +117,10 @@ def judge_surface(types, s, k):
     rests: the surface is given up, nothing is wrong in the frame, and the fault is declared to stay. counts:
     something is wrong in the frame and, with several instants a frame, also in the one before and after it.
     """
-    c, srf = types.config, types.surface[s]
-    judged, returns = srf.judged, c.returns_lagged and k >= 0
+    c = types.config
+    srf = types.surface[s]
+    judged = srf.judged
+    returns = c.returns_lagged and k >= 0
     rests = c.abrupt and srf.accommodation.mode == GIVE_UP and not judged.anomalous
     counts = judged.anomalous and (c.single_instant or (srf.earlier.anomalous and srf.last.anomalous))
     for h in range(N_TYPES):

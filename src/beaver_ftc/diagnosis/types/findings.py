@@ -48,7 +48,8 @@ def _find_pair(fdi: np.void, names: Sequence[str]) -> FindingDict:
     An open plane has an alarm and no isolated surface. A statistical alarm names no plane: it opens both,
     while no surface is isolated.
     """
-    status, alarms = fdi["types"]["surface"]["status"], fdi["types"]["pair"]["group_alarm"]
+    status = fdi["types"]["surface"]["status"]
+    alarms = fdi["types"]["pair"]["group_alarm"]
     estimator = fdi["verdict"]["isolated_estimator"]
     isolated = np.flatnonzero(status["is_isolated"]).tolist()
     isolated.sort(key=lambda s: status["isolated_at_s"][s])
@@ -76,7 +77,8 @@ def _find_one(fdi: np.void, names: Sequence[str]) -> FindingDict:
     if estimator == NOT_ISOLATED:
         return {**NO_FINDINGS, "candidates": tuple(_candidate_texts(fdi, range(len(names)), names))}
     if estimator == UNANTICIPATED:
-        label, at_s = "unanticipated", float(conclusion["isolated_at_s"])
+        label = "unanticipated"
+        at_s = float(conclusion["isolated_at_s"])
         return {**NO_FINDINGS, "isolated": label, "isolation_type": label, "isolation_time_s": at_s}
     s = int(fdi["isolation"]["estimator"][estimator]["surface"])
     return _finding_on_surface(fdi, s, int(conclusion["fault_type"]), names)

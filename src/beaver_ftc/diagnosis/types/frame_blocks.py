@@ -33,11 +33,13 @@ def record_commands(types, commands, ext):
     surface was, rad, and of G, rad/s2 per rad.
     """
     for s, srf in enumerate(types.surface):
-        cmd, u_c = srf.commands, clip_travel(srf, commands[s])
+        cmd = srf.commands
+        u_c = clip_travel(srf, commands[s])
         if types.block.n_so_far == 0:
             begin_commands(cmd, types.config.frames_per_block)
         cmd.history[0, types.block.n_so_far] = u_c
-        cmd.cmd_min[0], cmd.cmd_max[0] = (min(cmd.cmd_min[0], u_c), max(cmd.cmd_max[0], u_c))
+        cmd.cmd_min[0] = min(cmd.cmd_min[0], u_c)
+        cmd.cmd_max[0] = max(cmd.cmd_max[0], u_c)
         cmd.u_min[0] = min(cmd.u_min[0], ext.u_min[s])
         cmd.u_max[0] = max(cmd.u_max[0], ext.u_max[s])
         cmd.G_min = min(cmd.G_min, ext.G_min[s])
@@ -64,8 +66,10 @@ def extend_block(types, layout, est, nu, bound):
 
     nu_bound = mean eta_bar + (nbar[k] + nbar[k+N]) / (N dt)
     """
-    c, block = types.config, types.block
-    begins, share = block.n_so_far == 0, 1.0 / c.frames_per_block
+    c = types.config
+    block = types.block
+    begins = block.n_so_far == 0
+    share = 1.0 / c.frames_per_block
     if begins:
         block.nu[:] = block.nu_bound[:] = 0.0
         block.n_start = bound.n_old

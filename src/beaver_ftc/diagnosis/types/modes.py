@@ -120,7 +120,9 @@ def accommodate(types, layout):
     The lead is the first such surface, unless the main surface of pitch is one that another can replace
     (SCALE_COMMAND or GIVE_UP): it then leads.
     """
-    lead, lead_mode, presumed = NO_SURFACE, -1, presumed_surface(types, layout)
+    lead = NO_SURFACE
+    lead_mode = -1
+    presumed = presumed_surface(types, layout)
     clear_modes(types.surface)
     for s, srf in enumerate(types.surface):
         if srf.status.is_isolated or s == presumed:
@@ -131,7 +133,8 @@ def accommodate(types, layout):
                 srf.accommodation.mode = mode
                 leads = s == layout.main[PITCH] and mode in (SCALE_COMMAND, GIVE_UP)
                 if lead == NO_SURFACE or leads:
-                    lead, lead_mode = s, mode
+                    lead = s
+                    lead_mode = mode
     return lead, lead_mode
 
 
@@ -143,7 +146,8 @@ def count_silence(srf, mode, possible):
 
     possible: whether the surface can be faulty.
     """
-    last, acc = srf.last, srf.accommodation
+    last = srf.last
+    acc = srf.accommodation
     p = deflection_error(srf, possible) + last.u
     agrees = last.lo <= p <= last.hi or mode == SCALE_COMMAND
     acc.n_silent = 0 if agrees else acc.n_silent + 1

@@ -18,7 +18,11 @@ OBSERVATION_RECORD = record(u=float, lo=float, hi=float, anomalous=int, kappa=fl
 @kernel
 def copy_observation(new, old):
     """Copy the observation `old` into `new`."""
-    (new.u, new.lo, new.hi, new.anomalous, new.kappa) = (old.u, old.lo, old.hi, old.anomalous, old.kappa)
+    new.u = old.u
+    new.lo = old.lo
+    new.hi = old.hi
+    new.anomalous = old.anomalous
+    new.kappa = old.kappa
     copy(old.hides, new.hides)
 
 
@@ -46,7 +50,9 @@ def observe_surface(c, srf, fie, m, nu, nu_max, eff, anomalous):
     estimator of its position. Over a block the axes weigh a varying position differently, so that they need
     not agree on its mean.
     """
-    last, cmd, G_m = srf.last, srf.commands, eff.Z[m]
+    last = srf.last
+    cmd = srf.commands
+    G_m = eff.Z[m]
     copy_observation(srf.earlier, srf.judged)
     copy_observation(srf.judged, last)
     last.anomalous = anomalous
@@ -65,7 +71,8 @@ def observe_error(srf, e, tol):
 
     Returns whether there is such a p.
     """
-    last, act = srf.last, srf.actuator
+    last = srf.last
+    act = srf.actuator
     last.lo = max(act.reach_lo, last.u + e - tol)
     last.hi = min(act.reach_hi, last.u + e + tol)
     last.anomalous = abs(e) > tol

@@ -23,9 +23,11 @@ from beaver_ftc.diagnosis.types.verdict import can_be_faulty, update_status
 def locate_lateral(types, layout, est, nu, nu_max):
     """Find where ailerons and rudder were in the elapsed frame; set `lateral_outside` for good if one was
     nowhere within its reach."""
-    a, r = layout.main[ROLL], layout.main[YAW]
+    a = layout.main[ROLL]
+    r = layout.main[YAW]
     for s, s_other in ((a, r), (r, a)):
-        eff, eff_other = est[layout.position[s]].effect, est[layout.position[s_other]].effect
+        eff = est[layout.position[s]].effect
+        eff_other = est[layout.position[s_other]].effect
         if not locate_one(types.surface[s], eff, eff_other, nu, nu_max):
             types.pair.lateral_outside = 1
 
@@ -41,8 +43,10 @@ def locate_one(srf, eff, eff_other, nu, nu_max):
     L1, N1; L, N       rad/s2 per rad    effect in roll and yaw: of this surface, eff; of the other, eff_other
     e_L, e_N           rad/s2            nu_max of the axis, and the tolerances r of both effects
     """
-    L1, N1 = eff.Z[ROLL], eff.Z[YAW]
-    L, N = eff_other.Z[ROLL], eff_other.Z[YAW]
+    L1 = eff.Z[ROLL]
+    N1 = eff.Z[YAW]
+    L = eff_other.Z[ROLL]
+    N = eff_other.Z[YAW]
     det = L1 * N - N1 * L
     e_L = nu_max[ROLL] + eff.r[ROLL] + eff_other.r[ROLL]
     e_N = nu_max[YAW] + eff.r[YAW] + eff_other.r[YAW]
@@ -59,9 +63,11 @@ def isolate_lateral(types, layout, t):
                     refuted (by deflections out of reach, or since all types of one are excluded), or one of
                     them has no type left that has shown itself or need not (`explains_flight`)
     """
-    roller, yawer = types.surface[layout.main[ROLL]], types.surface[layout.main[YAW]]
+    roller = types.surface[layout.main[ROLL]]
+    yawer = types.surface[layout.main[YAW]]
     both = not can_be_faulty(roller) and not can_be_faulty(yawer)
-    refuted, explained = types.pair.lateral_outside == 1, True
+    refuted = types.pair.lateral_outside == 1
+    explained = True
     for srf in (roller, yawer):
         refuted = refuted or not any_remains(srf, ALL)
         explained = explained and explains_flight(srf)

@@ -69,11 +69,15 @@ def locate_second(types, layout, est, nu, nu_max):
     """
     s1 = types.pair.first_pitch
     s2 = layout.partner[s1]
-    srf1, srf2 = types.surface[s1], types.surface[s2]
-    eff1, eff2 = est[layout.position[s1]].effect, est[layout.position[s2]].effect
-    M1, M2 = eff1.Z[PITCH], eff2.Z[PITCH]
+    srf1 = types.surface[s1]
+    srf2 = types.surface[s2]
+    eff1 = est[layout.position[s1]].effect
+    eff2 = est[layout.position[s2]].effect
+    M1 = eff1.Z[PITCH]
+    M2 = eff2.Z[PITCH]
     lo, hi = constant_range(types.config, srf1, types.frame_index)
-    srf1.last.lo, srf1.last.hi = lo, hi
+    srf1.last.lo = lo
+    srf1.last.hi = hi
     set_anomalous(srf1, 0)
     e = (nu[PITCH] - M1 * last_error(srf1)) / M2
     tol = 0.5 * abs(M1) * (hi - lo) + nu_max[PITCH] + eff1.r[PITCH] + eff2.r[PITCH]
@@ -85,7 +89,9 @@ def locate_second(types, layout, est, nu, nu_max):
 def constant_range(c, srf, k):
     """Least and greatest deflection of a surface by frame k over the constant types that remain, within its
     reach, rad."""
-    lo, hi, act = np.inf, -np.inf, srf.actuator
+    lo = np.inf
+    hi = -np.inf
+    act = srf.actuator
     for h in range(N_CONSTANT):
         if type_remains(srf, h):
             h_lo, h_hi = deflection_range(h, c, srf, h, k)
@@ -141,12 +147,15 @@ def store_first(types, s):
     The wait is necessary because a second fault that begins to show may refute one type first, and all of
     them soon after: the sets from before it began must then still be there.
     """
-    pair, srf, newly_excluded = types.pair, types.surface[s], False
+    pair = types.pair
+    srf = types.surface[s]
+    newly_excluded = False
     for h in range(N_CONSTANT):
         newly_excluded = newly_excluded or srf.sets.excluded[h] != srf.first_sets.excluded[h]
     pair.n_unstored = pair.n_unstored + 1 if newly_excluded else 0
     if pair.first_pitch != s or pair.n_unstored >= types.config.half_frames:
-        pair.first_pitch, pair.n_unstored = s, 0
+        pair.first_pitch = s
+        pair.n_unstored = 0
         copy_sets(srf.first_sets, srf.sets)
         for h in range(N_CONSTANT, N_TYPES):
             srf.first_sets.excluded[h] = 1
@@ -168,13 +177,15 @@ def begin_second_if_shown(types, layout):
     s1 = types.pair.first_pitch
     if s1 == NO_SURFACE or layout.partner[s1] < 0 or has_second(types):
         return
-    srf1, srf2 = types.surface[s1], types.surface[layout.partner[s1]]
+    srf1 = types.surface[s1]
+    srf2 = types.surface[layout.partner[s1]]
     if can_be_faulty(srf1) and constant_remains(srf1):
         return
     copy_sets(srf1.sets, srf1.first_sets)
     examination.restart_surface(srf2)
     for srf in (srf1, srf2):
-        srf.status.may_be_sole, srf.status.basis = 0, DEDUCED_FAULTY
+        srf.status.may_be_sole = 0
+        srf.status.basis = DEDUCED_FAULTY
         forget_anomalies(srf)
 
 
@@ -183,7 +194,8 @@ def update_second(types, layout, t):
     """Update which of the two surfaces are at fault, at t s, after a second fault has begun: the first (srf1)
     unless nothing on the second (srf2) explains what refuted it; the second once a type on it shows."""
     s1 = types.pair.first_pitch
-    srf1, srf2 = types.surface[s1], types.surface[layout.partner[s1]]
+    srf1 = types.surface[s1]
+    srf2 = types.surface[layout.partner[s1]]
     anomalous = srf2.evidence.n_anomalous > 0
     possible = can_be_faulty(srf2) and remaining.any_remains(srf2, ALL)
     update_status(srf1, possible or not anomalous, srf1.status.fault_type, t)

@@ -42,10 +42,12 @@ def decide_pairs(types, past, layout, t):
     first, for `conclusion.record_decision`; if there is none, that of UNANTICIPATED or NOT_ISOLATED."""
     outside = isolate_lateral(types, layout, t)
     isolate_pitch(types, layout, t)
-    first, earliest_s = NO_SURFACE, np.inf
+    first = NO_SURFACE
+    earliest_s = np.inf
     for s, srf in enumerate(types.surface):
         if srf.status.is_isolated and srf.status.isolated_at_s < earliest_s:
-            first, earliest_s = s, srf.status.isolated_at_s
+            first = s
+            earliest_s = srf.status.isolated_at_s
     if first == NO_SURFACE and outside:
         first = UNANTICIPATED
     return verdict.finding_on_surface(types, past, layout, first, t)

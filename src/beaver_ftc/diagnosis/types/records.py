@@ -146,7 +146,8 @@ def configure_types(
 ) -> None:
     """Fill the configuration of the types, but for has_eG (schemes/__init__.py), and the actuator of each
     surface. layout: of `layout_dtype`; servos: the declared actuators; travel (2, n): the stops, rad."""
-    fdi, dt = declared.fdi, 1.0 / declared.rate_hz
+    fdi = declared.fdi
+    dt = 1.0 / declared.rate_hz
     n_block = ceil(BLOCK_DURATION_S / dt) if declared.sensors.declared.gyros_vary else 1
     assert n_block <= MAX_BLOCK  # because a scenario's rate is at most 1000 Hz
     half = pi / fdi.slowest_oscillation_rad_s / (n_block * dt)
@@ -157,7 +158,8 @@ def configure_types(
         abrupt=fdi.fault_profile == "abrupt",
     )  # fmt: skip
     fill(types["pair"], first_pitch=-1, enabled=fdi.pairs)
-    data, h = servo_data(declared), dt / declared.substeps
+    data = servo_data(declared)
+    h = dt / declared.substeps
     for s, (srf, lo, hi) in enumerate(zip(types["surface"], *travel, strict=True)):
         approaches, steps, band = (servos[field][s] for field in ("approaches", "steps", "band"))
         rate_rad_s = data["rate_limit_rad_s"][s] or DEFAULT_RATE_RAD_S

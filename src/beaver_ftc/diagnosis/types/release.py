@@ -47,7 +47,8 @@ HEALTHY_RAD = 1e-14
 def set_return(rel, b, h, lo, hi):
     """Replace the interval of the positions of returns in slot b, rad. min and max are there because rounding
     may swap ends that meet."""
-    rel.back_lo[b, h], rel.back_hi[b, h] = min(lo, hi), max(lo, hi)
+    rel.back_lo[b, h] = min(lo, hi)
+    rel.back_hi[b, h] = max(lo, hi)
 
 
 @kernel
@@ -69,7 +70,8 @@ def allow_before(srf, h):
     forget_return(rel, EARLIER, h)
     set_return(rel, LATER, h, srf.actuator.stop_lo, srf.actuator.stop_hi)
     rel.held_lo[h], rel.held_hi[h] = EMPTY_SET
-    rel.set_lo[:, h], rel.set_hi[:, h] = srf.sets.low[h], srf.sets.high[h]
+    rel.set_lo[:, h] = srf.sets.low[h]
+    rel.set_hi[:, h] = srf.sets.high[h]
 
 
 @kernel
@@ -89,12 +91,16 @@ def simulate_return(c, srf, p0, end, anywhere=False):
     every step a possible position, too: p <- max(p, p0) for end 1, min for end -1.
     """
     act = srf.actuator
-    total, p, p_min, p_max = 0.0, p0, p0, p0
+    total = 0.0
+    p = p0
+    p_min = p0
+    p_max = p0
     for frame in range(c.frames_per_block):
         u = srf.commands.history[1, frame]
         for _ in range(c.n_substeps):
             total += p
-            p_min, p_max = min(p_min, p), max(p_max, p)
+            p_min = min(p_min, p)
+            p_max = max(p_max, p)
             p = farthest(p, u, end, act.approaches, act.steps, act.band, act.stop_lo, act.stop_hi)
             if anywhere:
                 p = min(p, p0) if end < 0.0 else max(p, p0)
@@ -149,7 +155,9 @@ def narrow_return(c, srf, b, h):
     return began, and by no more than that. A return that is over (`healthy`) cannot be why the frame is
     anomalous.
     """
-    judged, lo, hi = srf.judged, srf.release.back_lo[b, h], srf.release.back_hi[b, h]
+    judged = srf.judged
+    lo = srf.release.back_lo[b, h]
+    hi = srf.release.back_hi[b, h]
     (low, high), tols, _ = simulate_ends(c, srf, lo, hi)
     tol = max(tols)
     healthy = max(abs(low - tol - judged.u), abs(high + tol - judged.u)) <= HEALTHY_RAD
@@ -174,7 +182,8 @@ def held_set(c, srf, h, lo, hi):
     case, because those that do not explain the frame must be forgotten.
     """
     returns = c.returns_lagged and keep_returns(c, srf, h)
-    released, judged = srf.release.released, srf.judged
+    released = srf.release.released
+    judged = srf.judged
     if lo <= judged.hi and hi >= judged.lo and not released[h]:
         return (judged.lo, judged.hi) if is_position(srf, h) else UNLIMITED_SET
     if not returns:
@@ -194,19 +203,22 @@ def begin_release(c, srf, h, lo, hi, stop):
     If the parameter is the position, and no earlier release is possible any more, the later ones become the
     earlier ones.
     """
-    rel, seen = srf.release, srf.judged if c.single_instant else srf.earlier
+    rel = srf.release
+    seen = srf.judged if c.single_instant else srf.earlier
     if is_position(srf, h) and not may_return(rel, EARLIER, h):
         for ends in (rel.back_lo, rel.back_hi, rel.set_lo, rel.set_hi):
             ends[EARLIER, h] = ends[LATER, h]
         forget_return(rel, LATER, h)
-        rel.set_lo[LATER, h], rel.set_hi[LATER, h] = srf.sets.low[h], srf.sets.high[h]
+        rel.set_lo[LATER, h] = srf.sets.low[h]
+        rel.set_hi[LATER, h] = srf.sets.high[h]
     rel.held_lo[h], rel.held_hi[h] = EMPTY_SET
     if max(lo, seen.lo) <= min(hi, seen.hi) and not rel.released[h]:
         if c.single_instant or stop != -1:
             lo = max(lo, seen.lo)
         if c.single_instant or stop != 1:
             hi = min(hi, seen.hi)
-        rel.held_lo[h], rel.held_hi[h] = lo, hi
+        rel.held_lo[h] = lo
+        rel.held_hi[h] = hi
         widen_later(rel, h, lo, hi)
 
 

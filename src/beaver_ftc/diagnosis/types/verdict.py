@@ -87,7 +87,8 @@ def others_dismissed(types, sole):
     A type that must show itself has been waited for (`would_have_shown`). If errors of the surfaces' effects
     are declared (has_eG), a varying fault can hide in them, and every type of the others must be excluded.
     """
-    c, wait_half_cycles = types.config, 1
+    c = types.config
+    wait_half_cycles = 1
     for s, srf in enumerate(types.surface):
         if s != sole and srf.status.may_be_sole and can_be_faulty(srf):
             if (c.has_eG and any_remains(srf, ALL)) or not would_have_shown(c, srf):

@@ -31,7 +31,9 @@ def consistent_interval(c, srf, h, k):
     at its stop at any instant of the frame may have a larger offset than it shows. An offset takes no surface
     beyond its stop: NO_THETA.
     """
-    judged, cmd, act = srf.judged, srf.commands, srf.actuator
+    judged = srf.judged
+    cmd = srf.commands
+    act = srf.actuator
     if judged.hi < act.stop_lo or judged.lo > act.stop_hi:
         return NO_THETA
     lo, hi = judged_error(srf)
@@ -53,7 +55,8 @@ def deflection_range(c, srf, h, k):
 def mean_with_offset(srf, b, u_end):
     """Mean of u + b over the elapsed frame, rad. If u + b meets a stop in the frame, the stop cuts off an
     unknown part of it; u_end + b, cut off, then bounds the mean (u_end: the extreme of u on this side)."""
-    cmd, act = srf.commands, srf.actuator
+    cmd = srf.commands
+    act = srf.actuator
     stops = cmd.u_min[0] + b < act.stop_lo or cmd.u_max[0] + b > act.stop_hi
     return clip_travel(srf, u_end + b) if stops else srf.last.u + b
 

@@ -27,7 +27,8 @@ def reset_memory(srf, h):
     M = srf.growing_bias
     M.up = M.down = 0.0
     M.has_run[:] = 0
-    M.b_lo, M.b_hi = -np.inf, np.inf
+    M.b_lo = -np.inf
+    M.b_hi = np.inf
 
 
 @kernel
@@ -85,7 +86,8 @@ def consistent_interval(c, srf, h, k):
     M = srf.growing_bias
     M.up = max(M.up, lo)
     M.down = min(M.down, hi)
-    grew, fell = M.up > 0.0, M.down < 0.0
+    grew = M.up > 0.0
+    fell = M.down < 0.0
     shrinks = (grew and hi < M.up) or (fell and lo > M.down)
     return EMPTY_SET if lo > hi or (grew and fell) or shrinks else UNLIMITED_SET
 

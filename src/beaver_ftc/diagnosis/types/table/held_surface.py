@@ -100,7 +100,8 @@ def up_range(c, srf, h, k):
 
     lo, hi: the stops; p0: the lowest position at which it first showed; d: `runaway_distance`.
     """
-    act, ev = srf.actuator, srf.evidence
+    act = srf.actuator
+    ev = srf.evidence
     lo = ev.first_lo + runaway_distance(c, srf, k) if ev.k_first >= 0 else act.stop_lo
     return min(act.stop_hi, lo), act.stop_hi
 
@@ -109,7 +110,8 @@ def up_range(c, srf, h, k):
 def down_range(c, srf, h, k):
     """lo <= p <= max(lo, p0 - d), the same downwards, rad; p0: the highest position at which it first
     showed."""
-    act, ev = srf.actuator, srf.evidence
+    act = srf.actuator
+    ev = srf.evidence
     hi = ev.first_hi - runaway_distance(c, srf, k) if ev.k_first >= 0 else act.stop_hi
     return act.stop_lo, max(act.stop_lo, hi)
 

@@ -59,7 +59,8 @@ def consistent_interval(c, srf, h, k):
             M.last_end = k
             M.n_half += 1
             M.square = 0.0
-        M.sign, M.since = sign, k
+        M.sign = sign
+        M.since = k
     return EMPTY_SET if k - M.since > c.half_frames else UNLIMITED_SET
 
 

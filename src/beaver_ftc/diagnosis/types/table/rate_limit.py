@@ -30,16 +30,20 @@ def consistent_interval(c, srf, h, k):
     restarts with what is seen. If a frame has several JSBSim steps, the first still follows the command of
     the frame before (`commands_of_frame`).
     """
-    judged, M = srf.judged, srf.rate_limit
-    side, away = side_of_commands(c, srf), False
+    judged = srf.judged
+    M = srf.rate_limit
+    side = side_of_commands(c, srf)
+    away = False
     if side == 0 or side != M.side or k != M.k_last + 1:
-        M.lo, M.hi = judged.lo, judged.hi
+        M.lo = judged.lo
+        M.hi = judged.hi
     else:
         away = judged.lo > M.hi if side == 1 else judged.hi < M.lo
         narrow_by_motion(c, srf, M, side)
     M.lo = max(M.lo, judged.lo)
     M.hi = min(M.hi, judged.hi)
-    M.side, M.k_last = side, k
+    M.side = side
+    M.k_last = k
     return EMPTY_SET if away else UNLIMITED_SET
 
 
@@ -69,7 +73,8 @@ def commands_of_frame(c, srf):
     If the frame has one instant, only the command of the frame before it (index 2) has moved the surface;
     otherwise the commands of both frames (2 and 1) have.
     """
-    cmd, b = srf.commands, 2 if c.single_instant else 1
+    cmd = srf.commands
+    b = 2 if c.single_instant else 1
     return min(cmd.cmd_min[2], cmd.cmd_min[b]), max(cmd.cmd_max[2], cmd.cmd_max[b])
 
 

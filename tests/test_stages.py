@@ -22,7 +22,7 @@ COMPILED = {"kernel", "apart", "lazy_kernel"}
 SEVERAL_FILES = {"std", "e_G"}  # of the rows: rates.py and forces.py fill their own
 OTHER_FOLDER: set[str] = set()
 # Fields of one record, which is put together elsewhere
-PARTS = {"TEST_FIELDS", "ISOLATION_FIELDS", "GYRO_FIELDS", "FLOW_FIELDS", "TURN_FIELDS"}
+PARTS = {"TURN_FIELDS"}
 
 
 @cache

@@ -23,8 +23,8 @@ def new_fdi():
 
 
 def fill(record, **values):
-    """Fill fields of a stage's record, in itself or in its config, memory or output. Returns the record."""
-    sections = [record[part] for part in ("config", "memory", "output") if part in record.dtype.names]
+    """Fill fields of a stage's record, in itself or in one of its parts. Returns the record."""
+    sections = [record[part] for part in record.dtype.names if record.dtype[part].names]
     for name, value in values.items():
         next(part for part in (record, *sections) if name in (part.dtype.names or ()))[name] = value
     return record

@@ -49,13 +49,13 @@ VERTICAL = SENSOR_OF[VERTICAL_TEST]
 @kernel
 def judge_vertical_speed(mon, y):
     """Judge h times the vertical speed by the change of the altitude, filtered, and by that of the flow."""
-    j, past = VERTICAL_TEST, mon.y_past
-    climbed = mon.h * past[VERTICAL]
-    mon.residual[j] = y[ALTITUDE] - past[ALTITUDE] - climbed
-    set_bound(mon, j, mon.per_s[CLIMB_TEST] + mon.e_past[VERTICAL], mon.per_sample[CLIMB_TEST])
+    j, tests, past, h = VERTICAL_TEST, mon.tests, mon.sample.y_past, mon.config.h
+    climbed = h * past[VERTICAL]
+    tests.residual[j] = y[ALTITUDE] - past[ALTITUDE] - climbed
+    set_bound(tests, j, tests.per_s[CLIMB_TEST] + mon.errors.e_past[VERTICAL], tests.per_sample[CLIMB_TEST])
     filter_test(mon, j)
-    by_flow = abs(mon.y_pred[ALTITUDE] - past[ALTITUDE] - climbed) / (mon.h * mon.per_s[j])
-    mon.ratio[j] = min(mon.ratio[j], by_flow)
+    by_flow = abs(mon.sample.y_pred[ALTITUDE] - past[ALTITUDE] - climbed) / (h * tests.per_s[j])
+    tests.ratio[j] = min(tests.ratio[j], by_flow)
 
 
 @kernel

@@ -415,9 +415,9 @@ def _read_block(blk: np.void) -> StatisticalBlock:
 def _read_sensor_monitor(mon: np.void) -> SensorMonitor:
     output = mon["output"]
     names = ("residual", "per_s", "per_sample", "gust", "r", "B")
-    worst = SensorTest(*(mon[name][output["worst_test_index"]].copy() for name in names))
+    worst = SensorTest(*(mon["tests"][name][output["worst_test_index"]].copy() for name in names))
     fields = (
         "config.enabled output.alarmed output.worst_test_index output.top_ratio output.isolated_sensor "
-        "h gust_change y_pred e"
+        "config.h air.gust_change sample.y_pred errors.e"
     )
     return _read(SensorMonitor, mon, fields, worst, output["is_reading_unused"].astype(bool))

@@ -73,7 +73,7 @@ def record_alarm(bank, row, column):
 def record_sensor_monitor(monitor, missing, row, column, columns):
     """How near a test between the instruments came to its bound in this frame, and which; and the first
     instrument that gives no reading, missing (N_SENSORS,). Returns the next column."""
-    if monitor.config.enabled and monitor.stage:
+    if monitor.config.enabled and monitor.dynamics.stage:
         row[column], row[column + 1] = (
             monitor.output.top_ratio,
             monitor.output.worst_test_index,

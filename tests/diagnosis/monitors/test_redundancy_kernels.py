@@ -41,7 +41,7 @@ def test_sound_sensors_stay_within_every_bound(seed, swiftly, h):
     drift[np.abs(np.arange(N_SENSORS) - PHI - 1) > 1] = 0.0
     noise = rng.choice([0.0, 0.2, 1.0], N_SENSORS) * UNITS
     monitor = new_monitor(h, np.abs(bias) + noise, np.abs(bias))
-    monitor["e_slope"], monitor["drift"] = np.abs(slope), np.abs(drift).max()
+    fill(monitor, e_slope=np.abs(slope), drift=np.abs(drift).max())
     readings = (1.0 + slope) * true + bias + noise * rng.choice([-1.0, 1.0], true.shape)
     readings += h * np.arange(n)[:, None] * drift
     nearest = np.max([ratio for ratio, _ in compared(monitor, readings)], axis=0)
@@ -86,29 +86,29 @@ def test_a_reading_that_jumps_exceeds_its_own_tests_and_a_small_error_none(senso
 
 def test_a_declared_error_is_of_the_reading_and_what_is_steady_does_not_change():
     """|reading - truth| <= offset + slope |truth|, and |truth| <= (|reading| + offset) / (1 - slope)."""
-    red, signal = new_monitor(0.02, 0.3, 0.25), np.full(N_SENSORS, -3.0)
+    errors, signal = new_monitor(0.02, 0.3, 0.25, e_slope=0.1)["errors"], np.full(N_SENSORS, -3.0)
     signal[PHI + 2] += 2.0 * np.pi  # a heading is off by its slope of the angle from north
-    red["e_slope"] = 0.1
-    redundancy.bound_readings(red, signal)
+    redundancy.bound_readings(errors, signal)
     truth = (3.0 + 0.3) / 0.9
-    assert red["e"] == pytest.approx(truth - 3.0)
-    assert red["n"] == pytest.approx(truth - 3.0 - 0.25 + 3e-10, rel=1e-9)
+    assert errors["e"] == pytest.approx(truth - 3.0)
+    assert errors["n"] == pytest.approx(truth - 3.0 - 0.25 + 3e-10, rel=1e-9)
 
 
 def test_filters_sum_what_was_with_what_each_pole_keeps():
     rng, n, h = np.random.default_rng(2), 30, 0.02
     keep, gust = np.array([0.0, 0.8, 0.97]), np.array([0.1, 0.2, 0.3])
     red = fill(new_monitor(h), decay=keep, gust_change=gust, gust=0.5)
+    tests = red["tests"]
     residual, rate, noise = rng.normal(size=n), rng.uniform(1, 2, n), rng.uniform(1, 2, n)
     for values in zip(residual, rate, noise, strict=True):
-        red["residual"][1], red["per_s"][1], red["per_sample"][1] = values
+        tests["residual"][1], tests["per_s"][1], tests["per_sample"][1] = values
         redundancy.filter_test(red, 1)
     weight = keep[:, None] ** np.arange(n)[::-1]
     changes = (1.0 - keep) * (weight[:, 1:] @ noise[:-1]) + noise[-1]
-    r, B = red["r"][1], red["B"][1]
+    r, B = tests["r"][1], tests["B"][1]
     assert r == pytest.approx(weight @ residual)
     assert pytest.approx(h * weight @ rate + changes + 0.5 * gust) == B
-    assert red["ratio"][1] == pytest.approx(np.max(np.abs(r) / B))
+    assert tests["ratio"][1] == pytest.approx(np.max(np.abs(r) / B))
 
 
 def test_near_the_vertical_the_tests_of_the_attitude_begin_anew():
@@ -118,7 +118,7 @@ def test_near_the_vertical_the_tests_of_the_attitude_begin_anew():
     ratios = [ratio[ANGLE_TEST + 1] for ratio, _ in compared(monitor, readings)]
     assert ratios[0] > 1.0  # 0.03 rad in a sample, and no rates
     assert ratios[1:3] == [0.0, 0.0]  # that of now, or that of before, is beyond 1.3 rad
-    assert monitor["r"][ANGLE_TEST + 1] == pytest.approx([-0.03] * 3)
+    assert monitor["tests"]["r"][ANGLE_TEST + 1] == pytest.approx([-0.03] * 3)
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -130,7 +130,7 @@ def test_momentary_errors_of_the_attitude_stay_within_bounds_that_remember_long(
     readings[:, :3] = readings[:, PHI] = 0.0
     readings[:, PHI : PHI + 3] += e[PHI : PHI + 3] * rng.choice([-1.0, 0.0, 1.0], (400, 3))
     monitor = new_monitor(0.02, e)
-    monitor["decay"] = 0.0, 0.99, 0.9999
+    fill(monitor, decay=(0.0, 0.99, 0.9999))
     for ratio, _ in compared(monitor, readings):
         assert (ratio[TURN_TEST : TURN_TEST + 3] <= 1.0).all()
 
@@ -138,8 +138,8 @@ def test_momentary_errors_of_the_attitude_stay_within_bounds_that_remember_long(
 @pytest.mark.parametrize("share", [0.99, 1.01])
 def test_duplicates_differ_by_no_more_than_both_their_errors(share):
     monitor, readings = new_monitor(0.02), np.zeros(N_SENSORS)
-    monitor["e"] = np.arange(N_SENSORS) * 0.01
+    monitor["errors"]["e"] = np.arange(N_SENSORS) * 0.01
     for i, j, within in zip(DUPLICATE, COUNTERPART, DUPLICATE_TOLERANCE, strict=True):
         readings[i] = readings[j] + share * (within + 0.01 * (i + j))
     redundancy.compare_duplicates(monitor, readings, np.ones(N_SENSORS, int))
-    assert ((monitor["ratio"][N_EQUATIONS:] > 1.0) == (share > 1.0)).all()
+    assert ((monitor["tests"]["ratio"][N_EQUATIONS:] > 1.0) == (share > 1.0)).all()

@@ -70,7 +70,12 @@ def flown(readings, true, missing=None, air=None, **fields):
         o = monitor["output"]
         history.append(
             np.concatenate(
-                [o["suspect"], monitor["cleared"], monitor["gyro"]["verdict"], o["is_reading_unused"]]
+                [
+                    o["suspect"],
+                    monitor["course"]["cleared"],
+                    monitor["gyro"]["verdict"],
+                    o["is_reading_unused"],
+                ]
             )
         )
     return monitor, np.array(given), np.array(inertial), np.array(history)
@@ -139,12 +144,13 @@ def with_ratios(ratios, **fields):
     """Tests {test: ratio}, of which the residual is as large; in level flight, where each angle turns the
     aircraft about one axis. Other bounds are 1."""
     monitor = new_monitor(H, **fields)
-    monitor["B"] = 1.0
+    tests = monitor["tests"]
+    tests["B"] = 1.0
     for j, ratio in ratios.items():
-        monitor["ratio"][j], monitor["r"][j] = ratio, ratio
-    monitor["c_max"] = np.eye(3)
-    turns, angles = monitor["r"][TURN_TEST:][:3], monitor["r"][ANGLE_TEST:][:3]
-    monitor["beyond"] = turns - np.eye(3)[..., None] * angles[:, None]
+        tests["ratio"][j], tests["r"][j] = ratio, ratio
+    monitor["angle"]["c_max"] = np.eye(3)
+    turns, angles = tests["r"][TURN_TEST:][:3], tests["r"][ANGLE_TEST:][:3]
+    monitor["angle"]["beyond"] = turns - np.eye(3)[..., None] * angles[:, None]
     return monitor
 
 
@@ -200,16 +206,16 @@ def test_who_is_suspected_of_what_the_tests_show(ratios, who):
 )  # fmt: skip
 def test_an_error_of_the_attitude_that_has_shown_and_is_gone_is_no_gyros(peak, noise, verdict):
     """Two frames ago the first gyro's error has shown as 1 rad/s; the noise of the attitude in rad/s."""
-    monitor, fdi = new_monitor(H, w_bound=1.0), new_fdi()
+    monitor, fdi = new_monitor(H, W_max=1.0), new_fdi()
     gyro = monitor["gyro"]
     gyro["most_older"][0], gyro["most_past"][0] = 1.0, peak
-    monitor["per_sample"], fdi["bound"]["nu_max"] = noise * H / 4.0, 1.0
+    monitor["tests"]["per_sample"], fdi["bound"]["nu_max"] = noise * H / 4.0, 1.0
     fdi["bank"]["output"]["threshold"][:3] = 1.0
     gyro_or_attitude.judge_gyros(monitor, fdi["bank"], fdi["bound"], 0.02)
     assert gyro["verdict"][0] == verdict
 
 
-KEPT_MEMORY = "exceeded", "cleared", "gyros_excluded", "w_bound"
+KEPT_MEMORY = {"tests": "exceeded", "course": "cleared", "dynamics": "gyros_excluded"}
 KINDS = ("jump", "jump", "scale", "noise", "ramp", "frozen", "missing")
 
 
@@ -228,10 +234,14 @@ def test_faults_drawn_at_random_end_as_kept(i, changed):
         monitor, given, inertial, history = flown(readings[:90], true[:90], missing, air, **fields)
         output = monitor["output"]
         results = {name: output[name] for name in output.dtype.names}
-        results |= {name: monitor[name] for name in KEPT_MEMORY}
-        results |= {"gyro_verdict": monitor["gyro"]["verdict"]}
+        results |= {name: monitor[part][name] for part, name in KEPT_MEMORY.items()}
+        results |= {"w_bound": monitor["dynamics"]["W_max"], "gyro_verdict": monitor["gyro"]["verdict"]}
         initial = monitor["initial"]
-        results |= {"B": monitor["B"], "initial": initial["E"], "refuted": initial["refuted"].sum(axis=1)}
+        results |= {
+            "B": monitor["tests"]["B"],
+            "initial": initial["E"],
+            "refuted": initial["refuted"].sum(axis=1),
+        }
         results |= {"given": given.mean(axis=0), "inertial": inertial.sum(), "history": history.sum(axis=0)}
         kept.append(results)
     assert not changed(kept)

@@ -32,7 +32,7 @@ def judged(readings, h):
     """The hypotheses after each sample but the first; whether tests have exceeded their bounds by then."""
     monitor = new_monitor(h, 0.05 * UNITS, 0.01 * UNITS)
     for _ in compared(monitor, readings):
-        yield monitor["initial"], monitor["exceeded"]
+        yield monitor["initial"], monitor["tests"]["exceeded"]
 
 
 @pytest.mark.parametrize("kind", ["constant", "scale", "swinging"])
@@ -52,7 +52,7 @@ def test_what_is_broken_from_the_start_is_never_refuted(seed, h, theta, i, kind)
         reading, moved = signal[:, sensor], set()
         off = abs(reading / true - 1.0 if i == H_AIRSPEED else 2.0 * np.sin(0.5 * (reading - true)))
         for k, (initial, _) in enumerate(judged(signal, h), 1):
-            assert off[k] <= (initial["E"][i] + initial["d"][i]) * (1.0 + 1e-9), (size, k)
+            assert off[k] <= (initial["E"][i] + initial["dx"][i]) * (1.0 + 1e-9), (size, k)
             moved |= set(np.flatnonzero(initial["refuted"][i]).tolist())
         assert all(initial_errors.REACTS[i, j] for j in moved), (size, moved)
         assert kind != "constant" or not moved

@@ -57,7 +57,7 @@ def new_monitor(h, e_zero=0.0, const=0.0, **fields):
     monitor = np.zeros(1, SENSOR_MONITOR_RECORD).view(np.recarray)[0]
     fill(monitor, h=h, decay=np.exp(-h * np.array(FILTER_POLES_PER_S)), g=GRAVITY)
     fill(monitor, e_zero=e_zero, const=const, max_airspeed_mps=80.0, wind_max=1.0)
-    monitor["y_pred"][[ENGINE_SPEED, MANIFOLD]] = 1800.0, 20.0
+    monitor["sample"]["y_pred"][[ENGINE_SPEED, MANIFOLD]] = 1800.0, 20.0
     fill(monitor, enabled=1, substeps=1, has_engine=1, rate_gain=1.0, n_frozen=3, isolated_sensor=NO_SENSOR)
     return fill(monitor, alarmed_at_s=-1.0, isolated_at_s=-1.0, **fields)
 
@@ -69,7 +69,8 @@ def compared(monitor, readings):
     for y in readings[1:]:
         redundancy.run_tests(monitor, y, np.ones(1, int))
         initial_errors.update_bounds(monitor, y)
-        monitor["exceeded"] |= monitor["ratio"] > 1.0
-        initial_errors.latch_refuted(monitor, monitor["exceeded"])
-        yield monitor["ratio"].copy(), monitor["residual"].copy()
+        tests = monitor["tests"]
+        tests["exceeded"] |= tests["ratio"] > 1.0
+        initial_errors.latch_refuted(monitor, tests["exceeded"])
+        yield tests["ratio"].copy(), tests["residual"].copy()
         redundancy.store_sample(monitor, y, y[FORCES])

@@ -16,8 +16,15 @@ that a sensor cannot be the broken one:
                      an accelerometer is frozen
     gyro of an axis  the attitude shows no such turn about the axis (`clear_gyros`)
 
-Whether a sensor is frozen is judged here, too. Letters: redundancy.py and initial_errors.py; h s is the time
-between two samples; f is the record of a flow sensor, n its number.
+Whether a sensor is frozen is judged here, too.
+
+    y, y_past    (N_SENSORS,) readings now, and in the sample before, SI
+    h            time between two samples, s
+    i, j, m      sensor, test (redundancy.py), pole of a filter
+    b, f         number of a flow sensor (0 airspeed, 1 incidence, 2 sideslip), and its record
+    residual     residual of a test in this sample; r, B: the same through a filter, and the bound on it
+    V            airspeed, m/s
+    mon          record of the monitor (records.py)
 """
 
 import numpy as np
@@ -56,39 +63,39 @@ FORCES = (AX, AX + 1, AX + 2)
 # One flow sensor (airspeed, incidence or sideslip) since the alarm. r_sum, B_sum, H_sum: sums of the
 # residuals, of the bound on the part of sound sensors, and of that on an error from the start, in the unit of
 # the residual; y_min, y_max: range of the reading. The three flow sensors, their hypotheses (H_AIRSPEED, ...)
-# and their tests (SPEED_TEST, ...) have the same order: number n stands for all.
+# and their tests (SPEED_TEST, ...) have the same order: number b stands for all.
 FLOW_RECORD = record(r_sum=float, B_sum=float, H_sum=float, y_min=float, y_max=float)
 
-# What the comparison keeps, in the record of the monitor.
-FLOW_FIELDS = {
-    "flow": (FLOW_RECORD, 3),
-    "n_same": (int, N_SENSORS),  # how many samples in a row each reading has equalled the one before
-    "cleared": (int, N_SENSORS),  # whether each sensor is cleared
-    "turn_max": float,  # rad: largest turn of the attitude by sound sensors, 0 if unknown (gyro_turn.py)
-    "jump": float,  # largest change of an accelerometer between two samples, m/s2; it fades
-    "n_since": int,  # samples since the alarm
-    "climb": N_POLES,  # m: filtered effect on the altitude of the error that the incidence's sums show
-}  # fmt: skip
+# The comparison as a whole.
+#     flow        the flow sensors
+#     cleared     whether each sensor is cleared
+#     turn_max    largest turn of the attitude by sound sensors, rad, 0 if unknown (gyro_turn.py)
+#     n_since     samples since the alarm
+#     climb       filtered effect on the altitude of the error that the incidence's sums show, m
+COURSE_RECORD = record(
+    flow=(FLOW_RECORD, 3), cleared=(int, N_SENSORS), turn_max=float, n_since=int, climb=N_POLES,
+)  # fmt: skip
 
 
 @kernel
 def count_same(mon, y):
     """Count in n_same how many samples in a row each reading has equalled the one before; update the largest
-    jump of an accelerometer between two samples, which fades:
+    jump of an accelerometer between two samples, m/s2, which fades:
 
         jump <- max((1 - h / JUMP_MEMORY_S) jump, |y_i - y_past_i|)        i: the three accelerometers
     """
-    mon.jump *= 1.0 - mon.h / JUMP_MEMORY_S
+    sample = mon.sample
+    sample.jump *= 1.0 - mon.config.h / JUMP_MEMORY_S
     for i in range(N_SENSORS):
-        mon.n_same[i] = mon.n_same[i] + 1 if y[i] == mon.y_past[i] else 0
+        sample.n_same[i] = sample.n_same[i] + 1 if y[i] == sample.y_past[i] else 0
     for i in FORCES:
-        mon.jump = max(mon.jump, abs(y[i] - mon.y_past[i]))
+        sample.jump = max(sample.jump, abs(y[i] - sample.y_past[i]))
 
 
 @kernel
 def is_frozen(mon, i):
     """Whether sensor i is frozen: it has repeated its reading more often than a sound one."""
-    return mon.n_same[i] >= mon.config.n_frozen[i]
+    return mon.sample.n_same[i] >= mon.config.n_frozen[i]
 
 
 @kernel
@@ -103,7 +110,7 @@ def last_frozen(mon, sensors):
 @kernel
 def stands_still(mon, i):
     """Whether a sensor is frozen at a reading that is not zero: a sound sensor may read zero all the time."""
-    return mon.y_past[i] != 0.0 and is_frozen(mon, i)
+    return mon.sample.y_past[i] != 0.0 and is_frozen(mon, i)
 
 
 @kernel
@@ -113,14 +120,15 @@ def clear_sensors(mon, y):
     The order matters: `flow_jumped` reads n_since, the time since the alarm, before `sum_flow` advances it.
     """
     alarm = mon.output.alarm_test
+    course = mon.course
     flow = SENSOR_OF[alarm]
-    by_density = alarm == SPEED_TEST and mon.exceeded[DENSITY_TEST]
+    by_density = alarm == SPEED_TEST and mon.tests.exceeded[DENSITY_TEST]
     if is_frozen(mon, flow) or flow_jumped(mon, y, flow) or by_density:
-        mon.cleared[AX:] = 1
+        course.cleared[AX:] = 1
     sum_flow(mon, y)
-    is_integrated = sum_exceeds_range(mon.flow[alarm - SPEED_TEST])
+    is_integrated = sum_exceeds_range(course.flow[alarm - SPEED_TEST])
     if is_integrated or contradicted(mon, y) or last_frozen(mon, FORCES) >= 0:
-        mon.cleared[flow] = 1
+        course.cleared[flow] = 1
     clear_gyros(mon, y)
 
 
@@ -129,20 +137,23 @@ def flow_jumped(mon, y, i):
     """Whether, soon after the alarm, the residual exceeds the effect of a sound accelerometer's jump in one
     sample, and of the largest jump seen of late, and the reading of the flow sensor i jumps with it.
 
-        |r| > B + FORCE_JUMP_M_S2 per_a,    |ddy| >= MIN_JUMP_SHARE |r| > AB_NOW jump per_a
+        |residual| > B + FORCE_JUMP_M_S2 per_a
+        |ddy| >= MIN_JUMP_SHARE |residual| > AB_NOW jump per_a
 
-    r: residual of the sample, and B its bound, in m/s for the speed, else rad; per_a: residual by an
-    acceleration error of 1 m/s2 in one sample, h or h / V; ddy: second difference of the reading, with which
-    a step shows at any slope of the reading; jump: of `count_same`, m/s2; AB_NOW: weight of the present
-    acceleration in the integration (redundancy.py).
+    residual, B: in m/s for the speed, else rad; per_a: residual by an acceleration error of 1 m/s2 in one
+    sample, h or h / V; ddy: second difference of the reading, with which a step shows at any slope of the
+    reading; jump: of `count_same`, m/s2; AB_NOW: weight of the present acceleration in the integration
+    (redundancy.py).
     """
     j = mon.output.alarm_test
-    per_a = mon.h / (1.0 if j == SPEED_TEST else speed(mon.y_past))
-    ddy = abs(y[i] - 2.0 * mon.y_past[i] + mon.y_older[i])
-    r = abs(mon.residual[j])
-    soon = mon.n_since * mon.h < JUMP_WINDOW_S - TIME_ROUNDING_S
-    exceeds_forces = r > mon.B[j, 0] + FORCE_JUMP_M_S2 * per_a
-    return soon and exceeds_forces and ddy >= MIN_JUMP_SHARE * r > AB_NOW * mon.jump * per_a
+    sample = mon.sample
+    h = mon.config.h
+    per_a = h / (1.0 if j == SPEED_TEST else speed(sample.y_past))
+    ddy = abs(y[i] - 2.0 * sample.y_past[i] + sample.y_older[i])
+    residual = abs(mon.tests.residual[j])
+    soon = mon.course.n_since * h < JUMP_WINDOW_S - TIME_ROUNDING_S
+    exceeds_forces = residual > mon.tests.B[j, 0] + FORCE_JUMP_M_S2 * per_a
+    return soon and exceeds_forces and ddy >= MIN_JUMP_SHARE * residual > AB_NOW * sample.jump * per_a
 
 
 @kernel
@@ -152,31 +163,35 @@ def sum_flow(mon, y):
 
         r_sum <- r_sum + residual,    B_sum <- B_sum + h per_s,    H_sum <- H_sum + E H
         alpha = r_sum - clip(r_sum, -(B_sum + H_sum), B_sum + H_sum)        of the incidence
-        climb <- a climb + h V alpha cos(phi) cos(theta)
+        climb <- decay climb + h V alpha cos(phi) cos(theta)
 
-    E, H: bound on an error from the start, as of the alarm, and its effect (initial_errors.py); V m/s:
-    airspeed. r_sum and H_sum are 0 until the alarm; then B_sum starts at the noise of two samples and the
-    effect of a gust. alpha, rad, is the error of the incidence that sound sensors do not explain;
-    climb, m, is its effect on the altitude through each filter of decay a.
+    E, H: bound on an error from the start, as of the alarm, and its effect (initial_errors.py). r_sum and
+    H_sum are 0 until the alarm; then B_sum starts at the noise of two samples and the effect of a gust.
+    alpha, rad, is the error of the incidence that sound sensors do not explain; climb, m, is its effect on
+    the altitude through each filter of this decay per sample.
     """
-    for n, f in enumerate(mon.flow):
-        j = SPEED_TEST + n
+    course = mon.course
+    tests = mon.tests
+    h = mon.config.h
+    for b, f in enumerate(course.flow):
+        j = SPEED_TEST + b
         reading = y[SENSOR_OF[j]]
-        if mon.n_since == 0:
+        if course.n_since == 0:
             f.y_min = f.y_max = reading
             # noise of the first and of the last sample
-            f.B_sum = 2.0 * mon.per_sample[j] + mon.gust[j] * mon.gust_max
+            f.B_sum = 2.0 * tests.per_sample[j] + tests.gust[j] * mon.air.gust_max
         else:
-            f.r_sum += mon.residual[j]
-            f.B_sum += mon.h * mon.per_s[j]
-            f.H_sum += mon.initial.E_alarm[n] * mon.initial.H[n, j]
+            f.r_sum += tests.residual[j]
+            f.B_sum += h * tests.per_s[j]
+            f.H_sum += mon.initial.E_alarm[b] * mon.initial.H[b, j]
             f.y_min = min(f.y_min, reading)
             f.y_max = max(f.y_max, reading)
-    f = mon.flow[ALPHA_TEST - SPEED_TEST]
+    f = course.flow[ALPHA_TEST - SPEED_TEST]
     explained = f.B_sum + f.H_sum
     alpha = f.r_sum - min(max(f.r_sum, -explained), explained)
-    leak(mon.climb, mon.decay, mon.h * y[I_AIRSPEED] * alpha * np.cos(y[PHI]) * np.cos(y[THETA]))
-    mon.n_since += 1
+    climbed = h * y[I_AIRSPEED] * alpha * np.cos(y[PHI]) * np.cos(y[THETA])
+    leak(course.climb, mon.config.decay, climbed)
+    course.n_since += 1
 
 
 @kernel
@@ -196,28 +211,28 @@ def contradicted(mon, y):
     """Whether the error that the alarm shows, if it were the flow sensor's, would exceed another test that is
     within its bound: of the density for the airspeed, of the climb for the incidence, none for the sideslip.
 
-        effect > CLEAR_FACTOR (B + e H)        for some pole
+        effect > CLEAR_FACTOR (B_other + E H)        for some pole
 
-        incidence    effect = |climb|                              m, of `sum_flow`
-        airspeed     effect = 2 (1 - e) / V (|r| - B_speed)        of log(density)
+        incidence    effect = |climb|                        m, of `sum_flow`
+        airspeed     effect = 2 (1 - E) / V (|r| - B)        of log(density)
 
-    r, B_speed m/s: filtered residual of the speed and its bound; B: bound of the other test; e, H: bound on
-    an error of the flow sensor from the start, as of the alarm, and its effect on the other test
-    (initial_errors.py); e in the airspeed's effect is at most 1.
+    r, B m/s: of the speed; B_other: bound of the other test; E, H: bound on an error of the flow sensor from
+    the start, as of the alarm, and its effect on the other test (initial_errors.py); E in the airspeed's
+    effect is at most 1.
     """
     alarm = mon.output.alarm_test
     other = DENSITY_TEST if alarm == SPEED_TEST else CLIMB_TEST
-    if alarm == BETA_TEST or mon.exceeded[other]:
+    if alarm == BETA_TEST or mon.tests.exceeded[other]:
         return False
-    n = alarm - SPEED_TEST
-    e = mon.initial.E_alarm[n]
-    r = mon.r[alarm]
-    B = mon.B[alarm]
+    b = alarm - SPEED_TEST
+    E = mon.initial.E_alarm[b]
+    r = mon.tests.r[alarm]
+    B = mon.tests.B[alarm]
     # log(density) changes by twice the relative change of the airspeed
-    share = 2.0 * (1.0 - min(e, 1.0)) / speed(y)
-    for m, climb in enumerate(mon.climb):
+    share = 2.0 * (1.0 - min(E, 1.0)) / speed(y)
+    for m, climb in enumerate(mon.course.climb):
         effect = abs(climb) if alarm == ALPHA_TEST else share * (abs(r[m]) - B[m])
-        if effect > CLEAR_FACTOR * (mon.B[other, m] + e * mon.initial.H_m[n, other, m]):
+        if effect > CLEAR_FACTOR * (mon.tests.B[other, m] + E * mon.initial.H_m[b, other, m]):
             return True
     return False
 
@@ -233,8 +248,10 @@ def clear_gyros(mon, y):
     (gyro_turn.py), 0 if unknown. Near the vertical the attitude shows no turn.
     """
     alarm = mon.output.alarm_test
-    unexplained = abs(mon.residual[alarm]) - mon.B[alarm, 0]
-    if alarm == SPEED_TEST or too_steep(mon, y) or not 0.0 < mon.turn_max < unexplained:
+    residual = mon.tests.residual
+    turn_max = mon.course.turn_max
+    unexplained = abs(residual[alarm]) - mon.tests.B[alarm, 0]
+    if alarm == SPEED_TEST or too_steep(mon, y) or not 0.0 < turn_max < unexplained:
         return
     for i in range(3):
-        mon.cleared[i] |= abs(mon.residual[i]) < mon.turn_max
+        mon.course.cleared[i] |= abs(residual[i]) < turn_max

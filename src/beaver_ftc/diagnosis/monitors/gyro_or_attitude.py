@@ -10,11 +10,13 @@ follows an error of a gyro, as exactly as D_x is known (DAMPING_TOLERANCE). If t
 stays within its bound. `judge_gyros` compares W and the innovation with the error of the gyro that the
 attitude shows.
 
-Letters, in addition to those of redundancy.py:
-
-    W, B         `w` and `w_bound` of the record, (3,) rad/s
+    W, W_max     (3,) rad/s: the error of the gyros by the dynamics, and the bound on it without such an error
     shown        -residual / h of a test of turning: the error of its gyro if the attitude is right, rad/s
+    h, dt        duration of a sample and of a frame, s
     c            turn about a body axis per change of an angle, rad/rad (`turn_share`)
+    residual, B  residual of a test (redundancy.py), rad, and the bound on it through each filter
+    decay        factor per sample of each filter
+    mon          record of the monitor (records.py)
 """
 
 import numpy as np
@@ -54,14 +56,13 @@ GYRO_RECORD = record(
     least=float, least_past=float, gap=N_POLES, B_gap=N_POLES, verdict=int, replaced=int,
 )  # fmt: skip
 
-# What the comparison keeps, in the record of the monitor.
-GYRO_FIELDS = {
-    "stage": int, "gyro": (GYRO_RECORD, 3), "gyros_excluded": int, "w": 3, "w_bound": 3,
-    # since the alarm, rad: by angle, body axis and pole, filtered residual of turning beyond the part of the
-    # angle's own residual; by angle and pole, filtered size of the angle's residual; by angle and body axis,
-    # largest size of turn_share
-    "beyond": (3, 3, N_POLES), "swing": (3, N_POLES), "c_max": (3, 3),
-}  # fmt: skip
+# The comparison as a whole; gyros_excluded: whether no gyro can be broken.
+DYNAMICS_RECORD = record(stage=int, W=3, W_max=3, gyros_excluded=int)
+# One angle since the alarm (`filter_beyond`).
+#     beyond    (axes, poles) rad: filtered residual of turning beyond the part of the angle's own residual
+#     swing     (poles,) rad: filtered size of the angle's residual
+#     c_max     (axes,): largest size of turn_share
+ANGLE_RECORD = record(beyond=(3, N_POLES), swing=N_POLES, c_max=3)
 
 
 @kernel
@@ -77,44 +78,44 @@ def turn_share(y, i, j):
 
 @kernel
 def advance_gyro_estimate(mon, nu, eta, dt):
-    """Advance W and its bound B by a frame of dt s:
+    """Advance W and its bound by a frame of dt s:
 
-        W <- A W + dt nu,    B <- |A| B + dt eta,    A = I - dt D_x
+        W <- A W + dt nu,    W_max <- |A| W_max + dt eta,    A = I - dt D_x
 
     W (3,) rad/s is the error of the gyros, if all of the innovation is due to it. nu, eta (3,) rad/s2:
     innovation of the frame, and the bound on it that the declared uncertainty gives.
     """
-    w = mon.w
-    B = mon.w_bound
-    w0 = components(vector(w))
-    B0 = components(vector(B))
+    W = mon.dynamics.W
+    W_max = mon.dynamics.W_max
+    W_past = components(vector(W))
+    W_max_past = components(vector(W_max))
     for i in range(3):
-        w[i] = dt * nu[i]
-        B[i] = dt * eta[i]
+        W[i] = dt * nu[i]
+        W_max[i] = dt * eta[i]
         for j in range(3):
             A = (i == j) - dt * mon.config.D[i, j]
-            w[i] += A * w0[j]
-            B[i] += abs(A) * B0[j]
+            W[i] += A * W_past[j]
+            W_max[i] += abs(A) * W_max_past[j]
 
 
 @kernel
 def follow_gyro_errors(mon):
-    """Update the sizes in GYRO_RECORD by this sample: w = -residual / h, rad/s, is the error of a gyro if the
-    attitude is right. The first sample of a frame moves all sizes on by one frame.
+    """Update the sizes in GYRO_RECORD by what this sample shows. The first sample of a frame moves all sizes
+    on by one frame.
     """
-    for i, g in enumerate(mon.gyro):
-        w = -mon.residual[i] / mon.h
+    for i, gyro in enumerate(mon.gyro):
+        shown = -mon.tests.residual[i] / mon.config.h
         if mon.substep == 0:
-            g.shown_past = g.shown
-            g.shown = w
-            g.most_older = g.most_past
-            g.most_past = g.most
-            g.most = 0.0
-            g.least_past = g.least
-            g.least = np.inf
+            gyro.shown_past = gyro.shown
+            gyro.shown = shown
+            gyro.most_older = gyro.most_past
+            gyro.most_past = gyro.most
+            gyro.most = 0.0
+            gyro.least_past = gyro.least
+            gyro.least = np.inf
         else:
-            g.most = max(g.most, abs(w))
-            g.least = min(g.least, abs(w))
+            gyro.most = max(gyro.most, abs(shown))
+            gyro.least = min(gyro.least, abs(shown))
 
 
 @kernel
@@ -122,10 +123,11 @@ def restart_comparison(mon):
     """Restart the comparison of W with the attitude, because the tests of turning restart in this sample:
     without a residual they show neither an error of a gyro nor its absence.
     """
-    mon.stage = 1
-    mon.beyond[:] = mon.swing[:] = mon.c_max[:] = 0.0
-    for g in mon.gyro:
-        g.gap[:] = g.B_gap[:] = 0.0
+    mon.dynamics.stage = 1
+    for angle in mon.angle:
+        angle.beyond[:] = angle.swing[:] = angle.c_max[:] = 0.0
+    for gyro in mon.gyro:
+        gyro.gap[:] = gyro.B_gap[:] = 0.0
 
 
 @kernel
@@ -134,54 +136,59 @@ def advance_stage(mon):
     bound on W by the error that the attitude shows, because an error that a gyro has had from the first
     sample on has caused no innovation.
     """
-    if mon.stage < FULL_STAGE and mon.substep == 0:
-        mon.stage += 1
-        if mon.stage < FULL_STAGE:
-            for i, g in enumerate(mon.gyro):
-                mon.w_bound[i] += abs(g.shown)
+    dynamics = mon.dynamics
+    if dynamics.stage < FULL_STAGE and mon.substep == 0:
+        dynamics.stage += 1
+        if dynamics.stage < FULL_STAGE:
+            for i, gyro in enumerate(mon.gyro):
+                dynamics.W_max[i] += abs(gyro.shown)
 
 
 @kernel
 def exclude_gyros(mon):
     """Record that no gyro can be broken, once W and the attitude disagree by more than both bounds:
 
-        gap <- a gap + residual + h W,    B_gap <- a B_gap + h (B_W + DAMPING_TOLERANCE |W|)
+        gap <- decay gap + residual + h W,    B_gap <- decay B_gap + h (W_max + DAMPING_TOLERANCE |W|)
         |gap| > B_gap + B        for some axis and pole
 
-    residual rad: of the test of turning about the axis; B rad: bound on it through the filter; B_W rad/s:
-    `w_bound`; a: decay per sample. If the attitude is noisy, a surface is isolated only after this record.
+    residual, B: of the test of turning about the axis. If the attitude is noisy, a surface is isolated only
+    after this record.
     """
-    for i, g in enumerate(mon.gyro):
-        w = mon.w[i]
-        leak(g.gap, mon.decay, mon.residual[i] + mon.h * w)
-        leak(g.B_gap, mon.decay, mon.h * (mon.w_bound[i] + attitude.DAMPING_TOLERANCE * abs(w)))
-        if exceeds(g.gap, 1.0, g.B_gap, 1.0, mon.B[i]):
+    h = mon.config.h
+    decay = mon.config.decay
+    for i, gyro in enumerate(mon.gyro):
+        W = mon.dynamics.W[i]
+        leak(gyro.gap, decay, mon.tests.residual[i] + h * W)
+        leak(gyro.B_gap, decay, h * (mon.dynamics.W_max[i] + attitude.DAMPING_TOLERANCE * abs(W)))
+        if exceeds(gyro.gap, 1.0, gyro.B_gap, 1.0, mon.tests.B[i]):
             rule_out_gyros(mon)
 
 
 @kernel
 def rule_out_gyros(mon):
     """No gyro can be broken: a surface may be isolated."""
-    mon.gyros_excluded = 1
+    mon.dynamics.gyros_excluded = 1
 
 
 @kernel
 def filter_beyond(mon, y):
     """Filter what the tests of turning show beyond an error of one angle i, for each of phi, theta and psi:
 
-        beyond_ij <- a beyond_ij + r_j - c_ij r_i      swing_i <- a swing_i + |r_i|      c_max = max |c|
+        beyond_ij <- decay beyond_ij + r_j - c_ij r_i    swing_i <- decay swing_i + |r_i|    c_max = max |c|
 
     r_j, r_i rad: residuals about body axis j and of angle i, of this sample; c: `turn_share`. An error of
     angle i that changes by x in a sample moves r_i by x and r_j by c_ij x. If this angle alone is wrong,
     r_j - c_ij r_i is noise.
     """
-    for i in range(3):
-        r = mon.residual[ANGLE_TEST + i]
-        leak(mon.swing[i], mon.decay, abs(r))
+    decay = mon.config.decay
+    residual = mon.tests.residual
+    for i, angle in enumerate(mon.angle):
+        r = residual[ANGLE_TEST + i]
+        leak(angle.swing, decay, abs(r))
         for j in range(3):
             c = turn_share(y, j, i)
-            mon.c_max[i, j] = max(mon.c_max[i, j], abs(c))
-            leak(mon.beyond[i, j], mon.decay, mon.residual[j] - c * r)
+            angle.c_max[j] = max(angle.c_max[j], abs(c))
+            leak(angle.beyond[j], decay, residual[j] - c * r)
 
 
 @kernel
@@ -197,16 +204,16 @@ def judge_gyros(mon, bank, bound, dt):
                                                  W would show it (not allowed)
         yes                     no               undecided otherwise
 
-        shows      |nu| > nu_max, or a residual of the bank exceeds its threshold, or |W| > B
+        shows      |nu| > nu_max, or a residual of the bank exceeds its threshold, or |W| > W_max
         fits       |nu - jump| <= nu_max + tol + noise / dt,    jump = (shown - shown_past) / dt
         tol        MAX_DYNAMICS_PER_S max(|shown|, |shown_past|) + JUMP_TOLERANCE |jump|
         varies     noise < least_past < most_past / (1 + JUMP_TOLERANCE)
         brief      most_older > MIN_TRANSIENT noise, and since then every size < TRANSIENT_LEFT most_older
-        allowed    MIN_ESTIMATED_SHARE |shown| <= B + |W| + noise
+        allowed    MIN_ESTIMATED_SHARE |shown| <= W_max + |W| + noise
 
     noise rad/s: bound on the part of shown - shown_past by noise of the attitude; nu, nu_max, jump, tol
-    rad/s2, nu_max with RATE_ROUNDING, as B in `shows`; bank: the detection filters; bound: with nu_max of the
-    elapsed frame, of dt s.
+    rad/s2, nu_max with RATE_ROUNDING, as W_max in `shows`; bank: the detection filters; bound: with nu_max of
+    the elapsed frame, of dt s.
 
     A transient appears inside a frame, and is absent in all samples of the next frame. It is not an error of
     a gyro: that stays, and if it varies, it is not so small in every sample. If an error is present in every
@@ -215,23 +222,23 @@ def judge_gyros(mon, bank, bound, dt):
     before. The verdict then stays open, unless brief or not allowed, with no error shown, refutes it.
     """
     nu = bank.output.innovation
-    for i, g in enumerate(mon.gyro):
-        if g.verdict != GYRO_OPEN:
+    for i, gyro in enumerate(mon.gyro):
+        if gyro.verdict != GYRO_OPEN:
             continue
-        estimate = abs(mon.w[i])
-        B = mon.w_bound[i]
-        largest = max(abs(g.shown), abs(g.shown_past))
-        jump = (g.shown - g.shown_past) / dt
-        noise = SAMPLES_IN_JUMP * mon.per_sample[i] / mon.h
+        W_size = abs(mon.dynamics.W[i])
+        W_max = mon.dynamics.W_max[i]
+        largest = max(abs(gyro.shown), abs(gyro.shown_past))
+        jump = (gyro.shown - gyro.shown_past) / dt
+        noise = SAMPLES_IN_JUMP * mon.tests.per_sample[i] / mon.config.h
         nu_max = bound.nu_max[i] + RATE_ROUNDING
-        shows = abs(nu[i]) > nu_max or bank_axis(bank) >= 0 or estimate > B + RATE_ROUNDING
+        shows = abs(nu[i]) > nu_max or bank_axis(bank) >= 0 or W_size > W_max + RATE_ROUNDING
         tol = MAX_DYNAMICS_PER_S * largest + JUMP_TOLERANCE * abs(jump)
         fits = abs(nu[i] - jump) <= nu_max + tol + noise / dt
-        varies = noise < g.least_past < g.most_past / (1.0 + JUMP_TOLERANCE)
-        gone = max(largest, g.most_past) < TRANSIENT_LEFT * g.most_older
-        brief = gone and g.most_older > MIN_TRANSIENT * noise
-        allowed = MIN_ESTIMATED_SHARE * abs(g.shown) <= B + estimate + noise
+        varies = noise < gyro.least_past < gyro.most_past / (1.0 + JUMP_TOLERANCE)
+        gone = max(largest, gyro.most_past) < TRANSIENT_LEFT * gyro.most_older
+        brief = gone and gyro.most_older > MIN_TRANSIENT * noise
+        allowed = MIN_ESTIMATED_SHARE * abs(gyro.shown) <= W_max + W_size + noise
         if fits and shows:
-            g.verdict = GYRO_CONFIRMED
+            gyro.verdict = GYRO_CONFIRMED
         elif not (fits or varies) or (not shows and (brief or not allowed)):
-            g.verdict = GYRO_REFUTED
+            gyro.verdict = GYRO_REFUTED

@@ -1,7 +1,7 @@
 """The effect on the redundancy tests of an error that a sensor has had since the monitor began.
 
 There is one hypothesis for each reading from which others are predicted: that this sensor alone is broken,
-with the error x (initial_errors.py). For each hypothesis h and test j the kernels fill, for the sample before
+with the error x (initial_errors.py). For each hypothesis b and test j the kernels fill, for the sample before
 the present one,
 
     H    bound on |effect on residual j in one sample| / |x|, in the unit of the residual
@@ -28,12 +28,15 @@ in body axes; p, q, r rad/s; tests without their _TEST):
 Gyros need no such hypothesis: all of a gyro's error is in the test of its own axis in every sample. Neither
 does the dynamic pressure: only the density shows it.
 
-mon: record of the monitor; y, y_past: as in initial_errors.py. Letters of the kernels:
+Letters of the kernels:
 
+    mon      record of the monitor (records.py)
+    y        readings in the sample before, SI; y_now: in this one
     E        bound on |x|, of each hypothesis
-    A        bound on |a| in the step, times dt2, m/s         A_V = A / V, rad
-    G        gravity times dt2, m/s
-    dt       time between two samples, s                      dt2: the same and what is of second order in it
+    w_sum    |p| + |q| + |r|, rad/s
+    A        bound on |a| in the step, times h2, m/s          A_V = A / V, rad
+    G        gravity times h2, m/s
+    h        time between two samples, s                      h2: the same and what is of second order in it
     rate     `in_plane` of (p, q, r), rad/s: the part of the rate along the flow, + i that against the axis
              across it
     sec      1 / cos(beta) by its reading
@@ -83,26 +86,25 @@ def fill_effects(mon, y_now):
     """Fill H (N_INITIAL, RPM_TEST) and C (N_EFFECTS,) at y, the sample before, from which y_now is predicted.
 
     Here those of DENSITY: the true log V changes by (1 + x) times what the reading shows. The density
-    contains -2 log V, so its residual has the error 2 x log(V_now / V). w: bound on the rate, rad/s.
+    contains -2 log V, so its residual has the error 2 x log(V_now / V).
     """
-    y = mon.y_past
+    y = mon.sample.y_past
     C = mon.initial.C
-    w = abs(y[P]) + abs(y[Q]) + abs(y[R])
+    w_sum = abs(y[P]) + abs(y[Q]) + abs(y[R])
     C[V_IN_DENSITY] = 2.0 * np.log(speed(y_now) / speed(y))
     mon.initial.H[H_AIRSPEED, DENSITY_TEST] = abs(C[V_IN_DENSITY])
-    fill_attitude_effects(mon, y, w)
-    fill_flow_effects(mon, y, w)
+    fill_attitude_effects(mon, y, w_sum)
+    fill_flow_effects(mon, y, w_sum)
     fill_climb_effects(mon, y)
 
 
 @kernel
-def fill_attitude_effects(mon, y, w):
+def fill_attitude_effects(mon, y, w_sum):
     """Fill H and C of the tests of turning (TURN_TEST and the two after it) and of the angles (ANGLE_TEST
     and the two after it: phi, theta, psi).
 
     turn: q + i r about the level axes, as phi turns them, rad/s, so theta' = turn.real and
-    psi' = turn.imag / cos(theta). w: bound on the rate, rad/s; second = (dt w)^2, rad2: the axes turn during
-    the step.
+    psi' = turn.imag / cos(theta). second = (h w_sum)^2, rad2: the axes turn during the step.
 
                      phi off by x                             theta off by x
         turning      (q, r) is turned about the first axis,   the vertical, about which the aircraft turns at
@@ -112,25 +114,25 @@ def fill_attitude_effects(mon, y, w):
                                                               secants, of reading and truth differ by at most
                                                               x over both cosines; theta' has no theta
     """
-    dt = mon.h
+    h = mon.config.h
     H = mon.initial.H
     C = mon.initial.C
     rates = vector(y)[1]
     turn = rates * unit(y[PHI])
-    second = (dt * w) ** 2
+    second = (h * w_sum) ** 2
     # 1 / cos(theta) by its reading, and the largest one if theta is off
     sec = secant(y[THETA])
     sec_max = secant(abs(y[THETA]) + angle_of_chord(mon.initial.E[H_THETA]))
-    # Rotation in a step, rad: about the body's second and third axes; about the vertical, psi' dt
-    qr = dt * abs(turn)
-    heading = dt * abs(turn.imag) * sec_max
+    # Rotation in a step, rad: about the body's second and third axes; about the vertical, psi' h
+    qr = h * abs(turn)
+    heading = h * abs(turn.imag) * sec_max
     by_phi = sec * (qr + sec * second)
     by_theta = sec * sec_max * second
     H[H_PHI, :SPEED_TEST] = second, second + qr, second + qr, by_phi, by_phi, by_phi
     H[H_THETA, :ANGLE_TEST] = second + heading
     H[H_THETA, ANGLE_TEST:SPEED_TEST] = sec * heading + by_theta, by_theta, sec * heading + by_theta
-    C[PHI_IN_TURN] = dt * rates
-    C[THETA_IN_TURN] = dt * turn.imag
+    C[PHI_IN_TURN] = h * rates
+    C[THETA_IN_TURN] = h * turn.imag
 
 
 @kernel
@@ -148,16 +150,16 @@ def share_across(y):
 
 
 @kernel
-def fill_flow_effects(mon, y, w):
+def fill_flow_effects(mon, y, w_sum):
     """Fill H and C of the tests of flow: SPEED, m/s; ALPHA and BETA, rad.
 
-        dt2 = dt (1 + dt (a_max / V + w))       a_max, w: bounds on |a| and on the rate in the step
-        A = dt2 a_max       A_V = A / V         G = dt2 g
+        h2 = h (1 + h (a_max / V + w_sum))      a_max: bound on |a| in the step
+        A = h2 a_max        A_V = A / V         G = h2 g
 
                  SPEED            ALPHA                                   BETA
         V        0                sec A_V                                 sec A_V
-        alpha    A                sec (A_V + dt2 |rate| |sin(beta)|)      dt2 |rate| + A_V |sin(beta)|
-        beta     A                sec sec_max (dt2 |rate.real| + A_V)     A_V
+        alpha    A                sec (A_V + h2 |rate| |sin(beta)|)       h2 |rate| + A_V |sin(beta)|
+        beta     A                sec sec_max (h2 |rate.real| + A_V)      A_V
         phi      G share_across   sec G cos(theta) / V                    sec G cos(theta) / V
         theta    G                sec G / V                               G (|sin(phi)| + |sin(beta)|) / V
 
@@ -184,38 +186,39 @@ def fill_flow_effects(mon, y, w):
     theta    a has the error x g. alpha' has at most all of it, over V; beta' has the part sin(phi) along the
              second axis, and sin(beta) of the rest
     """
-    dt = mon.h
+    h = mon.config.h
     H = mon.initial.H
     C = mon.initial.C
+    a = mon.sample.a
     V = speed(y)
-    a_max = max(mon.a_size[0], length(mon.a))
-    dt2 = dt * (1.0 + dt * (a_max / V + w))
-    A = dt2 * a_max
-    G = dt2 * mon.g
+    a_max = max(mon.sample.a_size[0], length(a))
+    h2 = h * (1.0 + h * (a_max / V + w_sum))
+    A = h2 * a_max
+    G = h2 * mon.config.g
     H[:, SPEED_TEST] = 0.0, A, A, G * share_across(y), G
     pitch = abs(y[THETA])
     mean = min(pitch + 0.5 * angle_of_chord(mon.initial.E[H_THETA]), 0.5 * pitch + 0.25 * np.pi)
-    C[PHI_IN_FLOW] = dt * mon.g * down(y)[1]
-    C[THETA_IN_FLOW] = dt * mon.g * np.cos(mean)
+    C[PHI_IN_FLOW] = h * mon.config.g * down(y)[1]
+    C[THETA_IN_FLOW] = h * mon.config.g * np.cos(mean)
     A_V = A / V
     rate = in_plane(y, vector(y))
-    acc = in_plane(y, mon.a)
+    acc = in_plane(y, a)
     side = unit(y[I_BETA])
     sb = abs(side.imag)
     sec = secant(y[I_BETA])
     beta_max = abs(y[I_BETA]) + angle_of_chord(mon.initial.E[H_BETA])
     secs = sec * secant(beta_max)
-    turned = dt2 * abs(rate)
+    turned = h2 * abs(rate)
     by_phi = sec * G * np.cos(y[THETA]) / V
-    by_beta = secs * (dt2 * abs(rate.real) + A_V)
+    by_beta = secs * (h2 * abs(rate.real) + A_V)
     H[:, ALPHA_TEST] = sec * A_V, sec * (A_V + turned * sb), by_beta, by_phi, sec * G / V
     H[:, BETA_TEST] = sec * A_V, turned + A_V * sb, A_V, by_phi, G * (abs(np.sin(y[PHI])) + sb) / V
-    C[ALPHA_IN_BETA] = dt * rate
-    C[BETA_IN_ALPHA] = dt * rate.real
-    C[V_IN_ALPHA] = -dt * acc.imag * sec / V
-    C[V_IN_BETA] = dt * (mon.a[1].real * side.real - acc.real * side.imag) / V
-    C[FORCE_ON_ALPHA] = dt * sb * a_max / V
-    C[FORCE_ON_BETA] = dt * (np.sin(min(beta_max, 0.5 * np.pi)) * abs(acc.imag)) * secs / V
+    C[ALPHA_IN_BETA] = h * rate
+    C[BETA_IN_ALPHA] = h * rate.real
+    C[V_IN_ALPHA] = -h * acc.imag * sec / V
+    C[V_IN_BETA] = h * (a[1].real * side.real - acc.real * side.imag) / V
+    C[FORCE_ON_ALPHA] = h * sb * a_max / V
+    C[FORCE_ON_BETA] = h * (np.sin(min(beta_max, 0.5 * np.pi)) * abs(acc.imag)) * secs / V
 
 
 @kernel
@@ -223,9 +226,9 @@ def fill_climb_effects(mon, y):
     """Fill H and C of CLIMB, m:
 
         hypothesis    V        alpha    beta                            phi                  theta
-        H             climb    lift     dt V |(vertical.real, d_y)|     dt V share_across    dt V
+        H             climb    lift     h V |(vertical.real, down_y)|   h V share_across     h V
 
-    d: the vertical unit vector downwards; vertical: `in_plane` of it; lift = dt V cos(beta) |vertical|.
+    down: the vertical unit vector downwards; vertical: `in_plane` of it; lift = h V cos(beta) |vertical|.
 
     V        climb is the true change of the altitude, which is the predicted one over 1 + x: they differ by
              x times the true one
@@ -239,13 +242,13 @@ def fill_climb_effects(mon, y):
     theta    altitude' contains the vertical, which is turned against v
     """
     initial = mon.initial
-    d = down(y)
-    vertical = in_plane(y, d)
-    step = mon.h * speed(y)
+    to_ground = down(y)
+    vertical = in_plane(y, to_ground)
+    step = mon.config.h * speed(y)
     slower = 1.0 - min(initial.E[H_AIRSPEED], 1.0 - 1.0 / MAX_SPEED_RATIO)
-    climb = abs(mon.y_pred[ALTITUDE] - y[ALTITUDE]) / slower
+    climb = abs(mon.sample.y_pred[ALTITUDE] - y[ALTITUDE]) / slower
     lift = step * np.cos(y[I_BETA]) * abs(vertical)
-    by_beta = step * np.hypot(vertical.real, d[1].real)
+    by_beta = step * np.hypot(vertical.real, to_ground[1].real)
     initial.H[:, CLIMB_TEST] = climb, lift, by_beta, step * share_across(y), step
     mean = abs(np.angle(complex(-vertical.imag, vertical.real))) + 0.5 * angle_of_chord(initial.E[H_ALPHA])
     initial.C[ALPHA_IN_CLIMB] = lift * np.cos(min(mean, 0.5 * np.pi))

@@ -8,18 +8,18 @@ The error x of the sensor is counted as
     alpha, beta, phi, theta    x = 2 sin((reading - truth) / 2): by so much the angle turns a unit vector
     airspeed                   x = reading / truth - 1
 
-For each hypothesis h, test j and filter pole m the record holds
+For each hypothesis b (the sensor that is broken), test j and filter pole m the record holds
 
     H    bound on |effect on residual j in one sample| / |x|: initial_effects.py
     C    lower bound on the effect of a unit of x on the tests of a row of EVIDENCE together: there, too
     H_m  H through the filter, H_m <- decay_m H_m + H        C_m likewise
     E    bound on |x|. At the first sample it is as large as an aircraft can fly (E_start). Then, at each
          sample,
-             E <- min(E + (1 - decay_slow) d, E_start)
+             E <- min(E + (1 - decay_slow) dx, E_start)
          and for each row of EVIDENCE
-             E <- min(E, (r_m + B_m + 2 d H_m) / (EFFECT_LEFT C_m))
-    d    bound on the change of x within the memory of the slowest filter,
-             d = min(r_m + B_m + E H_m, E_start)
+             E <- min(E, (r_m + B_m + 2 dx H_m) / (EFFECT_LEFT C_m))
+    dx   bound on the change of x within the memory of the slowest filter,
+             dx = min(r_m + B_m + E H_m, E_start)
          where r_m, B_m and H_m are of the test CHANGE_TEST, which a change of x moves at once; for the
          airspeed the sum is multiplied by (1 + E) / V, which makes a share of m/s
 
@@ -27,16 +27,16 @@ r_m: |filtered residual|; B_m: bound on it for sound sensors, both in the unit o
 of the filter per sample. `tighten_bounds` says what r_m + B_m is for several tests and for the airspeed. A
 test refutes a hypothesis with
 
-    r_m > B_m + (E + d) H_m
-    r_m > (1 + E + d) B_m + (E + d) H_m     for the airspeed, in SPEED and the tests after it
+    r_m > B_m + (E + dx) H_m
+    r_m > (1 + E + dx) B_m + (E + dx) H_m   for the airspeed, in SPEED and the tests after it
 
 since a residual is the sum of the effect of sound sensors, at most B_m, and of the effect of the error. So an
 error from the start, of any size, never excludes the broken sensor. suspects.py and flow_or_force.py exclude
 a sensor by the effect that its error would have from now on. Their limit is B_m + E_alarm H_m, with E_alarm
 the E at the alarm.
 
-mon: record of the monitor; initial: its part of that name (INITIAL_RECORD); y (N_SENSORS,): readings, SI;
-y_past: those of the sample before.
+mon: record of the monitor (records.py); initial: its part of that name (INITIAL_RECORD); y (N_SENSORS,):
+readings, SI; V m/s: airspeed in the sample before.
 """
 
 import numpy as np
@@ -119,10 +119,10 @@ CHANGE_TEST = tuple(tests[0] for tests in AT_ONCE)
 INITIAL_SENSOR = tuple(SENSOR_OF[j] for j in CHANGE_TEST)  # the broken sensor of each hypothesis
 REACTS = np.array([[j in tests for j in range(N_TESTS)] for tests in AT_ONCE])
 
-# Letters as at the top. E_start, E_alarm: E at the first sample, and at the alarm; refuted: whether a test
-# has refuted a hypothesis since the alarm. Tests from RPM_TEST on do not depend on these errors.
+# E, dx, H, C, H_m, C_m: see the top. E_start, E_alarm: E at the first sample, and at the alarm; refuted:
+# whether a test has refuted a hypothesis since the alarm. Tests from RPM_TEST on do not depend on the errors.
 INITIAL_RECORD = record(
-    E_start=N_INITIAL, E=N_INITIAL, E_alarm=N_INITIAL, d=N_INITIAL,
+    E_start=N_INITIAL, E=N_INITIAL, E_alarm=N_INITIAL, dx=N_INITIAL,
     H=(N_INITIAL, RPM_TEST), H_m=(N_INITIAL, RPM_TEST, N_POLES),
     C=(complex, N_EFFECTS), C_m=(complex, N_EFFECTS, N_POLES),
     refuted=(int, N_INITIAL, N_TESTS),
@@ -130,14 +130,14 @@ INITIAL_RECORD = record(
 
 
 @kernel
-def exceeds(r, k, B, x, H):
-    """Whether no error of at most x explains a filtered residual: |r_m| > k B_m + x H_m for some pole m.
+def exceeds(r, factor, B, x, H):
+    """Whether no error of at most x explains a filtered residual: |r_m| > factor B_m + x H_m for some pole m.
 
-    r (poles,): filtered residual; B (poles,): bound on it for sound sensors, which counts k times;
+    r (poles,): filtered residual; B (poles,): bound on it for sound sensors, which counts `factor` times;
     H (poles,): bound on the effect of a unit of the error. r and B in the unit of the residual.
     """
     for m in range(r.size):
-        if abs(r[m]) > k * B[m] + x * H[m]:
+        if abs(r[m]) > factor * B[m] + x * H[m]:
             return True
     return False
 
@@ -150,8 +150,9 @@ def start_bounds(mon, y):
         phi, theta     MAX_CHORD
         airspeed       max(V / V_air sqrt(1 + DENSITY_SHARE) - 1, 1 - V / V_air sqrt(1 - DENSITY_SHARE))
 
-    V_air: airspeed by dynamic pressure and the density of the standard troposphere, m/s. The two values of
-    the airspeed are for the thickest and for the thinnest air; MAX_SPEED_RATIO - 1 limits them.
+    V: reading of the airspeed; V_air: airspeed by dynamic pressure and the density of the standard
+    troposphere, m/s. The two values of the airspeed are for the thickest and for the thinnest air;
+    MAX_SPEED_RATIO - 1 limits them.
     """
     E = mon.initial.E
     temperature = max(1.0 - LAPSE_PER_M * y[ALTITUDE], MIN_TEMPERATURE_RATIO)
@@ -159,46 +160,47 @@ def start_bounds(mon, y):
     ratio = speed(y) / np.sqrt(2.0 * max(y[I_QDYN], MIN_QDYN_PA) / density)
     x = max(ratio * np.sqrt(1.0 + DENSITY_SHARE) - 1.0, 1.0 - ratio * np.sqrt(1.0 - DENSITY_SHARE))
     E[H_AIRSPEED] = min(x, MAX_SPEED_RATIO - 1.0)
-    for h in (H_ALPHA, H_BETA):
-        angle = abs(y[INITIAL_SENSOR[h]]) + MAX_FLOW_ANGLE_RAD
-        E[h] = 2.0 * np.sin(0.5 * min(angle, np.pi))
+    for b in (H_ALPHA, H_BETA):
+        angle = abs(y[INITIAL_SENSOR[b]]) + MAX_FLOW_ANGLE_RAD
+        E[b] = 2.0 * np.sin(0.5 * min(angle, np.pi))
     E[H_PHI] = E[H_THETA] = MAX_CHORD
     copy(E, mon.initial.E_start)
 
 
 @kernel
-def allowed_effect(mon, j, m):
+def allowed_effect(tests, j, m):
     """r_m + B_m of test j and pole m: bound on the effect of any error through the filter, in the unit of the
     residual."""
-    return abs(mon.r[j, m]) + mon.B[j, m]
+    return abs(tests.r[j, m]) + tests.B[j, m]
 
 
 @kernel
 def widen_bounds(mon):
-    """Update d, and widen E by the part of it that the slowest filter m forgets in a sample:
+    """Update dx, and widen E by the part of it that the slowest filter m forgets in a sample:
 
-    d <- min(r_m + B_m + E H_m, E_start),    of the airspeed (1 + E) / V times the sum
-    E <- min(E + (1 - decay_m) d, E_start)
+    dx <- min(r_m + B_m + E H_m, E_start),    of the airspeed (1 + E) / V times the sum
+    E <- min(E + (1 - decay_m) dx, E_start)
     """
     initial = mon.initial
     m = SLOW_POLE
     E = initial.E
-    for h, j in enumerate(CHANGE_TEST):
-        d = allowed_effect(mon, j, m) + E[h] * initial.H_m[h, j, m]
-        if h == H_AIRSPEED:  # from m/s to a share of the truth, which is at least V / (1 + E)
-            d *= (1.0 + E[h]) / speed(mon.y_past)
-        initial.d[h] = min(d, initial.E_start[h])
-        E[h] = min(E[h] + (1.0 - mon.decay[m]) * initial.d[h], initial.E_start[h])
+    for b, j in enumerate(CHANGE_TEST):
+        dx = allowed_effect(mon.tests, j, m) + E[b] * initial.H_m[b, j, m]
+        if b == H_AIRSPEED:  # from m/s to a share of the truth, which is at least V / (1 + E)
+            dx *= (1.0 + E[b]) / speed(mon.sample.y_past)
+        initial.dx[b] = min(dx, initial.E_start[b])
+        E[b] = min(E[b] + (1.0 - mon.config.decay[m]) * initial.dx[b], initial.E_start[b])
 
 
 @kernel
 def tighten_bounds(mon):
     """Lower the bound on each error to what the tests allow, for each pole m and each row of EVIDENCE:
 
-        E <- min(E, s / (EFFECT_LEFT c)) if c > 0,    s^2 = sum over the tests of (r_m + B_m + 2 d H_m)^2
+        E <- min(E, s / (EFFECT_LEFT per_x)) if per_x > 0
+        s^2 = sum over the tests of (r_m + B_m + 2 dx H_m)^2        per_x = |C_m|
 
-    d: while the filter summed the effect, the error was up to d larger or smaller than the present one. c is
-    |C_m|, and s as above, but for these rows:
+    dx: while the filter summed the effect, the error was up to dx larger or smaller than the present one. s
+    and per_x differ for these rows:
 
         PHI_IN_FLOW, THETA_IN_FLOW      ALPHA and BETA count V times in s, so that all three terms are in m/s:
                                         together, SPEED, ALPHA and BETA show a velocity
@@ -206,32 +208,35 @@ def tighten_bounds(mon):
                                         the density, too, and SPEED limits it
         V_IN_ALPHA, V_IN_BETA           (1 + E) s: B_m is for a right airspeed, and a true airspeed that is
                                         1 + E times smaller makes it larger by that factor
-        ALPHA_IN_BETA, BETA_IN_ALPHA    c = cos(error / 2) |Re C_m| - sin(error / 2) |Im C_m| - FORCE_ON_*:
-                                        the effect of a vane on the other has a part of the force in it
+        ALPHA_IN_BETA, BETA_IN_ALPHA    per_x = cos(error / 2) |Re C_m| - sin(error / 2) |Im C_m| -
+                                        FORCE_ON_*: the effect of a vane on the other has a part of the
+                                        force in it
     """
     initial = mon.initial
+    tests = mon.tests
     E = initial.E
-    V = speed(mon.y_past)
-    for m in range(mon.decay.size):
+    V = speed(mon.sample.y_past)
+    for m in range(mon.config.decay.size):
         ratio = 1.0 + E[H_AIRSPEED]
-        for n, (h, first, last) in enumerate(EVIDENCE):
-            C_m = initial.C_m[n, m]
+        for row, (b, first, last) in enumerate(EVIDENCE):
+            C_m = initial.C_m[row, m]
             s2 = 0.0
             for j in range(first, last + 1):
-                effect = allowed_effect(mon, j, m) + 2.0 * initial.d[h] * initial.H_m[h, j, m]
-                s2 += (effect * V if n in (PHI_IN_FLOW, THETA_IN_FLOW) and j != SPEED_TEST else effect) ** 2
+                effect = allowed_effect(tests, j, m) + 2.0 * initial.dx[b] * initial.H_m[b, j, m]
+                in_m_s = row in (PHI_IN_FLOW, THETA_IN_FLOW) and j != SPEED_TEST
+                s2 += (effect * V if in_m_s else effect) ** 2
             s = np.sqrt(s2)
-            c = abs(C_m)
-            if n == V_IN_DENSITY:
-                s += 2.0 * ratio * allowed_effect(mon, SPEED_TEST, m) / V
-            elif h == H_AIRSPEED:
+            per_x = abs(C_m)
+            if row == V_IN_DENSITY:
+                s += 2.0 * ratio * allowed_effect(tests, SPEED_TEST, m) / V
+            elif b == H_AIRSPEED:
                 s *= ratio
-            elif n in (ALPHA_IN_BETA, BETA_IN_ALPHA):
-                half = 0.5 * angle_of_chord(E[h])
-                force = initial.C_m[FORCE_ON_ALPHA if h == H_ALPHA else FORCE_ON_BETA, m].real
-                c = np.cos(half) * abs(C_m.real) - np.sin(half) * abs(C_m.imag) - force
-            if c > 0.0:
-                E[h] = min(E[h], s / (EFFECT_LEFT * c))
+            elif row in (ALPHA_IN_BETA, BETA_IN_ALPHA):
+                half = 0.5 * angle_of_chord(E[b])
+                force = initial.C_m[FORCE_ON_ALPHA if b == H_ALPHA else FORCE_ON_BETA, m].real
+                per_x = np.cos(half) * abs(C_m.real) - np.sin(half) * abs(C_m.imag) - force
+            if per_x > 0.0:
+                E[b] = min(E[b], s / (EFFECT_LEFT * per_x))
 
 
 @kernel
@@ -240,16 +245,17 @@ def update_bounds(mon, y):
 
     In a steep attitude the tests of turning and of the angles restart, so that nothing shows a change of phi
     or theta. Their E is then E_start, what the filters have summed of their C restarts, and H_m = 1 in the
-    tests of the angles says that these have missed a change: d is E, until the filters have forgotten it.
+    tests of the angles says that these have missed a change: dx is E, until the filters have forgotten it.
     """
     initial = mon.initial
+    decay = mon.config.decay
     widen_bounds(mon)
     fill_effects(mon, y)
-    for n, C in enumerate(initial.C):
-        leak(initial.C_m[n], mon.decay, C)
-    for h in range(N_INITIAL):
+    for row, C in enumerate(initial.C):
+        leak(initial.C_m[row], decay, C)
+    for b in range(N_INITIAL):
         for j in range(RPM_TEST):
-            leak(initial.H_m[h, j], mon.decay, initial.H[h, j])
+            leak(initial.H_m[b, j], decay, initial.H[b, j])
     if too_steep(mon, y):
         copy(initial.E_start[H_PHI:], initial.E[H_PHI:])
         initial.C_m[:ALPHA_IN_BETA] = 0.0
@@ -258,30 +264,31 @@ def update_bounds(mon, y):
 
 
 @kernel
-def refutes_initial(mon, h, j):
-    """Whether a test's residual is larger than sound sensors and the error of hypothesis h explain: for a
-    pole m, r_m > factor B_m + x H_m, x = E + d. No hypothesis has an effect on the engine's tests and later
+def refutes_initial(mon, b, j):
+    """Whether a test's residual is larger than sound sensors and the error of hypothesis b explain: for a
+    pole m, r_m > factor B_m + x H_m, x = E + dx. No hypothesis has an effect on the engine's tests and later
     ones, which refute it if they exceed their bounds.
     """
     initial = mon.initial
+    tests = mon.tests
     if j >= RPM_TEST:
-        return mon.ratio[j] > 1.0
-    x = initial.E[h] + initial.d[h]
-    factor = 1.0 + x if h == H_AIRSPEED and j >= SPEED_TEST else 1.0
-    return exceeds(mon.r[j], factor, mon.B[j], x, initial.H_m[h, j])
+        return tests.ratio[j] > 1.0
+    x = initial.E[b] + initial.dx[b]
+    factor = 1.0 + x if b == H_AIRSPEED and j >= SPEED_TEST else 1.0
+    return exceeds(tests.r[j], factor, tests.B[j], x, initial.H_m[b, j])
 
 
 @kernel
 def latch_refuted(mon, exceeded):
     """Record by which of `exceeded` (N_TESTS,) each hypothesis is refuted."""
-    for h in range(N_INITIAL):
+    for b in range(N_INITIAL):
         for j in range(N_TESTS):
-            mon.initial.refuted[h, j] |= exceeded[j] and refutes_initial(mon, h, j)
+            mon.initial.refuted[b, j] |= exceeded[j] and refutes_initial(mon, b, j)
 
 
 @kernel
-def explains_exceeded(mon, h, alarm):
-    """Whether an error that the sensor of a hypothesis has had from the start, and that may change, explains
+def explains_exceeded(mon, b, alarm):
+    """Whether an error that the sensor of hypothesis b has had from the start, and that may change, explains
     all tests exceeded since the alarm.
 
     If the test that raised the alarm reacts at once to a change of this error, the other rules of suspects.py
@@ -289,6 +296,6 @@ def explains_exceeded(mon, h, alarm):
     may have changed, and the tests that react at once do not count.
     """
     for j in range(N_TESTS):
-        if mon.initial.refuted[h, j] and (REACTS[h, alarm] or not REACTS[h, j]):
+        if mon.initial.refuted[b, j] and (REACTS[b, alarm] or not REACTS[b, j]):
             return False
     return True

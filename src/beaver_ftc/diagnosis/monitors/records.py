@@ -1,7 +1,17 @@
 """The sensor monitor's record, and its finding in words.
 
-The files whose kernels fill a part of the record declare it: redundancy.py, initial_errors.py,
-gyro_or_attitude.py, flow_or_force.py and sensor_monitor.py. Letters as there.
+part            file that declares it      what is in it
+config, air     here                       what a scenario declares: rates and switches; turbulence
+output          here                       the conclusion
+errors          residual_bounds.py         bounds on the errors of the readings
+sample          redundancy.py              the samples before, and the prediction of this one
+tests           redundancy.py              residuals of the redundancy tests, and the bounds on them
+initial         initial_errors.py          errors that sensors have had from the start
+dynamics        gyro_or_attitude.py        the error of the gyros by the dynamics of the rates
+gyro, angle     gyro_or_attitude.py        of each gyro, and of each angle, what its tests have shown
+course          flow_or_force.py           of accelerometers and flow sensors, since the alarm
+t_start         here                       time of the first sample, s
+substep         here                       number of this sample in its frame
 """
 
 from typing import Any
@@ -9,11 +19,12 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.compiled import record
-from beaver_ftc.diagnosis.monitors.flow_or_force import FLOW_FIELDS
-from beaver_ftc.diagnosis.monitors.gyro_or_attitude import GYRO_FIELDS
+from beaver_ftc.diagnosis.monitors.flow_or_force import COURSE_RECORD
+from beaver_ftc.diagnosis.monitors.gyro_or_attitude import ANGLE_RECORD, DYNAMICS_RECORD, GYRO_RECORD
 from beaver_ftc.diagnosis.monitors.initial_errors import INITIAL_RECORD
-from beaver_ftc.diagnosis.monitors.redundancy import TEST_FIELDS
-from beaver_ftc.diagnosis.monitors.sensor_monitor import ISOLATION_FIELDS
+from beaver_ftc.diagnosis.monitors.numbering import N_POLES
+from beaver_ftc.diagnosis.monitors.redundancy import SAMPLE_RECORD, TESTS_RECORD
+from beaver_ftc.diagnosis.monitors.residual_bounds import ERRORS_RECORD
 from beaver_ftc.plant.instruments import N_SENSORS, SENSORS
 from beaver_ftc.scenario.sensors import sensor_words
 
@@ -21,10 +32,18 @@ UNANTICIPATED_DELAY_S = 1.0  # time from the alarm, after which a fault is unant
 
 MONITOR_CONFIG_RECORD = record(
     enabled=int, substeps=int, has_engine=int, y_trim=N_SENSORS,  # y_trim: readings in trim
+    h=float, decay=N_POLES, g=float,  # time between two samples, s; decay of each filter in it; gravity, m/s2
     rate_gain=float,  # share of its error that a replaced rate corrects in one sample
     noisy=int,  # whether the attitude is noisy: then a surface is isolated only once no gyro can be the cause
     n_frozen=(int, N_SENSORS),  # number of repeated samples (`n_same`) from which a reading counts as frozen
     D=(3, 3),  # 1/s: body rates decay with rate' = -D rate
+)  # fmt: skip
+
+# Declared turbulence. gust_max bounds the speed of a gust, gust_change its changes through each filter, both
+# m/s. gust_change holds up to max_airspeed_mps and above low_m: lower, a gust changes faster. wind_max: bound
+# on the vertical wind, m/s.
+AIR_RECORD = record(
+    gust_max=float, gust_change=N_POLES, max_airspeed_mps=float, low_m=float, wind_max=float,
 )  # fmt: skip
 
 MONITOR_OUTPUT_RECORD = record(
@@ -36,8 +55,9 @@ MONITOR_OUTPUT_RECORD = record(
 )  # fmt: skip
 
 SENSOR_MONITOR_RECORD = record(
-    config=MONITOR_CONFIG_RECORD, output=MONITOR_OUTPUT_RECORD, **TEST_FIELDS, initial=INITIAL_RECORD,
-    **ISOLATION_FIELDS, **GYRO_FIELDS, **FLOW_FIELDS,
+    config=MONITOR_CONFIG_RECORD, air=AIR_RECORD, output=MONITOR_OUTPUT_RECORD, errors=ERRORS_RECORD,
+    sample=SAMPLE_RECORD, tests=TESTS_RECORD, initial=INITIAL_RECORD, dynamics=DYNAMICS_RECORD,
+    gyro=(GYRO_RECORD, 3), angle=(ANGLE_RECORD, 3), course=COURSE_RECORD, t_start=float, substep=int,
 )  # fmt: skip
 
 

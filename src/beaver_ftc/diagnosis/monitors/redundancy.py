@@ -14,19 +14,17 @@ effect of the declared errors of all sensors together, as in detection/filters.p
 the bounds of flow and climb by the effect of its gusts within a filter's memory.
 
     y, y_past, y_pred  (N_SENSORS,)  readings now, in the sample before, as predicted from that; SI
-    e, e_past, e_older (N_SENSORS,)  bounds on their errors: now, in the sample before, in that before it
-    n                  (N_SENSORS,)  bound on the part of an error that changes from sample to sample
-    w                                body rates (3,), rad/s
+    w                  (2,)          vector (rotation.py): body rates, rad/s
     v, a, a_past       (2,)          vectors: velocity m/s, acceleration m/s2 with gravity, that of before
     q                  (z1, z2)      attitude (rotation.py)
     h                                time between two samples, s: a JSBSim frame
     i, j, m, d                       sensor or axis, test, pole of a filter, duplicate sensor
-    mon                              record of the monitor
+    mon                              record of the monitor (records.py)
 """
 
 import numpy as np
 
-from beaver_ftc.compiled import copy, kernel
+from beaver_ftc.compiled import copy, kernel, record
 from beaver_ftc.diagnosis.detection.filters import advance_bound, leak
 from beaver_ftc.diagnosis.monitors.numbering import (
     ANGLE_TEST,
@@ -78,50 +76,47 @@ COMPARISON_ROUNDING = (
 )
 FORCE_JUMP_M_S2 = 8.0  # a sound specific force changes by less from one sample to the next
 
-# What the tests read and fill, in the record of the monitor.
-TEST_FIELDS = {
-    "h": float, "decay": N_POLES, "g": float,  # s; decay of each filter per sample; gravity, m/s2
-    # Declared turbulence: gust_max bounds the speed of a gust, gust_change its changes through each filter,
-    # both m/s. gust_change holds up to max_airspeed_mps and above low_m: lower, a gust changes faster.
-    "gust_max": float, "gust_change": N_POLES, "max_airspeed_mps": float, "low_m": float,
-    "wind_max": float,  # bound on the vertical wind, m/s
-    # Declared errors, SI: |error| <= e_zero + e_slope |y|; const is the part that does not change. drift: of
-    # the attitude, rad/s.
-    "e_zero": N_SENSORS, "e_slope": N_SENSORS, "const": N_SENSORS, "drift": float,
-    # Bounds on the error of each reading (see the table at the top); e_drift, rad: their part by drift so far
-    "e": N_SENSORS, "n": N_SENSORS, "e_drift": float, "e_past": N_SENSORS, "e_older": N_SENSORS,
-    # Readings in the sample before, and in that before it; accelerations as vectors (rotation.py), m/s2: in
-    # the sample before, and in that before it, turned by `predict_readings` into the axes of the next one
-    "y_past": N_SENSORS, "y_older": N_SENSORS, "a": (complex, 2), "a_past": (complex, 2),
-    # |a| in the elapsed step and in the two before it; |a_past|; m/s2
-    "a_size": 3, "a_size_past": float,
-    "e_first": float,  # error of the acceleration in the first step, m/s2: no sample precedes that step
-    "y_pred": N_SENSORS,  # predicted readings; those of the engine are the commands
-    # By test, in the unit of the residual:
-    #     per_s, per_sample    bound on the residual of one sample: h per_s + per_sample + past
-    #     past                 per_sample of the sample before
-    #     gust                 effect on the residual of a gust that changes by 1 m/s
-    #     r, B                 filtered residual, and the bound on |r|; e_sum: part of B, summed by the filter
-    #     ratio                largest |r| / B over the poles
-    "residual": N_TESTS, "per_s": N_TESTS, "per_sample": N_TESTS, "past": N_TESTS, "gust": N_TESTS,
-    "r": (N_TESTS, N_POLES), "B": (N_TESTS, N_POLES), "e_sum": (N_TESTS, N_POLES), "ratio": N_TESTS,
-    # whether each duplicate sensor has agreed with the reading that it should equal, before any alarm
-    "agreed": (int, max(len(DUPLICATES), 1)),
-}  # fmt: skip
+# The samples before, and the prediction of this one, SI.
+#     y_past, y_older    readings in the sample before, and in that before it
+#     y_pred             predicted readings; those of the engine are the commands
+#     a, a_past          accelerations as vectors (rotation.py): in the sample before, and in that before it,
+#                        turned by `predict_readings` into the axes of the next one
+#     a_size             |a| in the elapsed step and in the two before it; a_size_past: |a_past|
+#     e_first            error of the acceleration in the first step: no sample precedes that step
+#     n_same, jump       of `flow_or_force.count_same`
+SAMPLE_RECORD = record(
+    y_past=N_SENSORS, y_older=N_SENSORS, y_pred=N_SENSORS, a=(complex, 2), a_past=(complex, 2), a_size=3,
+    a_size_past=float, e_first=float, n_same=(int, N_SENSORS), jump=float,
+)  # fmt: skip
+# By test, in the unit of the residual:
+#     per_s, per_sample    bound on the residual of one sample: h per_s + per_sample + past
+#     past                 per_sample of the sample before
+#     gust                 effect on the residual of a gust that changes by 1 m/s
+#     r, B                 filtered residual, and the bound on |r|; e_sum: part of B, summed by the filter
+#     ratio                largest |r| / B over the poles
+#     exceeded             whether the ratio has exceeded 1 since the alarm (suspects.py)
+# agreed: whether each duplicate sensor has agreed, before any alarm, with the reading that it should equal.
+TESTS_RECORD = record(
+    residual=N_TESTS, per_s=N_TESTS, per_sample=N_TESTS, past=N_TESTS, gust=N_TESTS, r=(N_TESTS, N_POLES),
+    B=(N_TESTS, N_POLES), e_sum=(N_TESTS, N_POLES), ratio=N_TESTS, exceeded=(int, N_TESTS),
+    agreed=(int, max(len(DUPLICATES), 1)),
+)  # fmt: skip
 
 
 @kernel
 def store_sample(mon, y, force):
     """Take y and the specific force (3,) m/s2 as the sample before, for the next one."""
-    mon.y_older = mon.y_past
-    copy(y, mon.y_past)
-    mon.e_older = mon.e_past
-    mon.e_past = mon.e
-    mon.a[:] = combined(1.0, vector(force), mon.g, down(y))
+    sample = mon.sample
+    errors = mon.errors
+    sample.y_older = sample.y_past
+    copy(y, sample.y_past)
+    errors.e_older = errors.e_past
+    errors.e_past = errors.e
+    sample.a[:] = combined(1.0, vector(force), mon.config.g, down(y))
 
 
 @kernel
-def predict_readings(mon):
+def predict_readings(sample, h):
     """Fill y_pred: attitude, altitude and flow now, from the sample before. Returns the attitude as q.
 
         step = (1, h w / 2) / |...|                       turn of an Euler step
@@ -133,9 +128,8 @@ def predict_readings(mon):
     A vector of fixed direction, turned by step, is q* v q: its components in the axes after the step. At the
     end a, turned by step, is the a_past of the next sample.
     """
-    h = mon.h
-    y = mon.y_pred
-    past = mon.y_past
+    y = sample.y_pred
+    past = sample.y_past
     w = vector(past)
     s1 = 1.0 + 0.5 * h * w[0]
     s2 = 0.5 * h * w[1]
@@ -152,10 +146,10 @@ def predict_readings(mon):
     v = complex(0.0, plane.real), complex(flow.imag, plane.imag)
     climb = times(v, down(past))[0].real  # the real part of v d is -(v . d): upwards
     y[ALTITUDE] = past[ALTITUDE] + h * climb
-    a = combined(AB_NOW, mon.a, -AB_PAST, mon.a_past)
-    mon.a_size_past = length(mon.a_past)
-    mon.a_size[:] = length(a), mon.a_size[0], mon.a_size[1]
-    mon.a_past[:] = turned(step, mon.a)
+    a = combined(AB_NOW, sample.a, -AB_PAST, sample.a_past)
+    sample.a_size_past = length(sample.a_past)
+    sample.a_size[:] = length(a), sample.a_size[0], sample.a_size[1]
+    sample.a_past[:] = turned(step, sample.a)
     v = turned(step, combined(1.0, v, h, a))
     y[I_AIRSPEED] = length(v)
     y[I_ALPHA] = np.arctan2(v[1].imag, v[0].imag)
@@ -170,8 +164,8 @@ def half_density(y):
 
 
 @kernel
-def fill_residuals(mon, y, q):
-    """Fill the residual of each test:
+def fill_residuals(residual, sample, y, q):
+    """Fill the residual (N_TESTS,) of each test:
 
         turning    2 (q* q_now), rad: the vector part, small, is half the turn; -q_now is the same attitude
         density    log(rho / rho_past),  rho = qdyn / V^2
@@ -182,97 +176,105 @@ def fill_residuals(mon, y, q):
     """
     turn = times(inverse(q), attitude(y))
     side = 2.0 if turn[0].real >= 0.0 else -2.0
-    mon.residual[:ANGLE_TEST] = components(combined(side, turn, 0.0, turn))
+    residual[:ANGLE_TEST] = components(combined(side, turn, 0.0, turn))
     for j in range(ANGLE_TEST, RPM_TEST):
-        r = y[SENSOR_OF[j]] - mon.y_pred[SENSOR_OF[j]]
-        mon.residual[j] = wrapped(r) if j < SPEED_TEST else r
-    mon.residual[DENSITY_TEST] = np.log(half_density(y) / half_density(mon.y_past))
+        r = y[SENSOR_OF[j]] - sample.y_pred[SENSOR_OF[j]]
+        residual[j] = wrapped(r) if j < SPEED_TEST else r
+    residual[DENSITY_TEST] = np.log(half_density(y) / half_density(sample.y_past))
 
 
 @kernel
 def filter_test(mon, j):
-    """Pass the residual of test j through its filters, a = exp(-pole h); find its largest ratio to the bound:
+    """Pass the residual of test j through its filters, decay = exp(-pole h) of each; find its largest ratio
+    to the bound:
 
-        r <- a r + residual,    B = e_sum + n + gust gust_change,    ratio = max |r| / B
-        e_sum <- a e_sum + h b + (1 - a) n_past        `filters.advance_bound`
+        r <- decay r + residual,    B = e_sum + per_sample + gust gust_change,    ratio = max |r| / B
+        e_sum <- decay e_sum + h per_s + (1 - decay) past        `filters.advance_bound`
 
-    b: per_s, in the unit of the residual over s; n, n_past: per_sample of this sample and of the one before.
+    per_s: in the unit of the residual over s; past: per_sample of the sample before.
     """
-    r = mon.r[j]
-    e = mon.e_sum[j]
-    B = mon.B[j]
-    n = mon.per_sample[j]
-    mon.ratio[j] = 0.0
-    leak(r, mon.decay, mon.residual[j])
-    for m, a in enumerate(mon.decay):
-        e[m] = advance_bound(e[m], mon.per_s[j], a, mon.h, mon.past[j])
-        B[m] = e[m] + n + mon.gust[j] * mon.gust_change[m]
-        mon.ratio[j] = max(mon.ratio[j], abs(r[m]) / B[m])
-    mon.past[j] = n
+    tests = mon.tests
+    r = tests.r[j]
+    e_sum = tests.e_sum[j]
+    B = tests.B[j]
+    tests.ratio[j] = 0.0
+    leak(r, mon.config.decay, tests.residual[j])
+    for m, decay in enumerate(mon.config.decay):
+        e_sum[m] = advance_bound(e_sum[m], tests.per_s[j], decay, mon.config.h, tests.past[j])
+        B[m] = e_sum[m] + tests.per_sample[j] + tests.gust[j] * mon.air.gust_change[m]
+        tests.ratio[j] = max(tests.ratio[j], abs(r[m]) / B[m])
+    tests.past[j] = tests.per_sample[j]
 
 
 @kernel
-def restart_tests(mon, n):
-    """Restart the first n tests with this sample: their filters are empty, and e_sum has the error that the
-    reading of this sample brings into the next prediction."""
-    mon.ratio[:n] = mon.residual[:n] = mon.r[:n] = 0.0
-    for j in range(n):
-        mon.e_sum[j] = mon.past[j] = mon.per_sample[j]
+def restart_tests(tests, end):
+    """Restart the tests before number `end` with this sample: their filters are empty, and e_sum has the
+    error that the reading of this sample brings into the next prediction."""
+    tests.ratio[:end] = tests.residual[:end] = tests.r[:end] = 0.0
+    for j in range(end):
+        tests.e_sum[j] = tests.past[j] = tests.per_sample[j]
 
 
 @kernel
-def compare(mon, j, residual, bound):
+def compare(tests, j, residual, bound):
     """Judge the residual of test j alone, without a filter, by the bound on it."""
-    mon.residual[j] = residual
-    mon.B[j, 0] = bound + COMPARISON_ROUNDING
-    mon.ratio[j] = abs(residual) / mon.B[j, 0]
+    tests.residual[j] = residual
+    tests.B[j, 0] = bound + COMPARISON_ROUNDING
+    tests.ratio[j] = abs(residual) / tests.B[j, 0]
 
 
 @kernel
 def compare_duplicates(mon, y, fresh):
     """Compare each duplicate sensor i with the reading j that it should equal, in the samples in which sensor
     i is read; fresh (sampled sensors,): whether each is. One of the two is broken if they differ by more than
-    tolerance + e_i + e_j. `agreed` records the pairs that have agreed before any alarm.
+    tolerance + e_i + e_j; e: bounds on the errors of both (residual_bounds.py). `agreed` records the pairs
+    that have agreed before any alarm.
     """
+    tests = mon.tests
+    e = mon.errors.e
     for d in range(DUPLICATE.size):
         i = DUPLICATE[d]
         j = COUNTERPART[d]
         test = N_EQUATIONS + d
-        mon.ratio[test] = 0.0
+        tests.ratio[test] = 0.0
         if fresh[i - N_IN_EQUATIONS]:
             r = wrapped(y[i] - y[j]) if PHI <= j <= PSI else y[i] - y[j]
-            compare(mon, test, r, DUPLICATE_TOLERANCE[d] + mon.e[i] + mon.e[j])
-            mon.agreed[d] |= mon.ratio[test] <= 1.0 and not mon.output.alarmed
+            compare(tests, test, r, DUPLICATE_TOLERANCE[d] + e[i] + e[j])
+            tests.agreed[d] |= tests.ratio[test] <= 1.0 and not mon.output.alarmed
 
 
 @kernel
 def start_tests(mon, y, force):
     """Start with the first sample, before which no reading is known; force (3,) m/s2."""
-    bound_readings(mon, y)
+    sample = mon.sample
+    bound_readings(mon.errors, y)
     store_sample(mon, y, force)
     store_sample(mon, y, force)  # twice: y_older and e_older are those of this sample, too
-    mon.a_past = mon.a
-    mon.a_size[:2] = length(mon.a) + FORCE_JUMP_M_S2
-    mon.e_first = AB_PAST * FORCE_JUMP_M_S2
+    sample.a_past = sample.a
+    sample.a_size[:2] = length(sample.a) + FORCE_JUMP_M_S2
+    sample.e_first = AB_PAST * FORCE_JUMP_M_S2
     bound_residuals(mon, y)
-    restart_tests(mon, N_EQUATIONS)
+    restart_tests(mon.tests, N_EQUATIONS)
 
 
 @kernel
 def run_tests(mon, y, fresh):
     """Compare this sample y with the one before; fresh (sampled sensors,): those that are read now."""
-    mon.e_drift += mon.h * mon.drift
-    bound_readings(mon, y)
-    fill_residuals(mon, y, predict_readings(mon))
+    sample = mon.sample
+    errors = mon.errors
+    errors.e_drift += mon.config.h * errors.drift
+    bound_readings(errors, y)
+    q = predict_readings(sample, mon.config.h)
+    fill_residuals(mon.tests.residual, sample, y, q)
     bound_residuals(mon, y)
-    mon.e_first = 0.0
+    sample.e_first = 0.0
     first = SPEED_TEST if too_steep(mon, y) else 0
-    restart_tests(mon, first)
+    restart_tests(mon.tests, first)
     for j in range(first, RPM_TEST):
         filter_test(mon, j)
     if mon.config.has_engine:
         for j in (RPM_TEST, PRESSURE_TEST):
             i = SENSOR_OF[j]
-            compare(mon, j, y[i] - mon.y_pred[i], mon.e[i])
+            compare(mon.tests, j, y[i] - sample.y_pred[i], errors.e[i])
     if N_TESTS > N_EQUATIONS:
         compare_duplicates(mon, y, fresh)

@@ -17,9 +17,12 @@ An isolated sensor is replaced by an estimate from the others (`estimate_reading
 the laws, until the end of the flight. Accelerometers are not replaced: the diagnosis uses none that may be
 broken (`measured.inertial`).
 
-Letters: redundancy.py and initial_errors.py; y (N_SENSORS,) readings, SI; mon: record of the monitor; o: its
-output; verdict: the conclusion about surfaces; bank: the detection filters; pred: the prediction of the
-model.
+    y, y_past        (N_SENSORS,) readings now, and in the sample before, SI
+    h, dt            duration of a sample and of a frame, s
+    i                sensor
+    mon, o           record of the monitor (records.py), and its output
+    pred, measured   prediction of the design model, readings of the sensors
+    verdict, bank    the conclusion about surfaces, the detection filters
 """
 
 import numpy as np
@@ -51,7 +54,6 @@ from beaver_ftc.diagnosis.monitors.numbering import (
     I_ALPHA,
     I_BETA,
     I_QDYN,
-    N_TESTS,
     NO_SENSOR,
     SPEED_TEST,
 )
@@ -73,10 +75,6 @@ INITIAL_WINDOW_S = 1.0  # an alarm of the surfaces within this time from the sta
 VANE_RETURN_S = 20.0  # time constant with which a replaced vane returns to trim: kinematics alone drift
 RATE_POLE = 1  # index in FILTER_POLES_PER_S of the filter that gives the first value of a replaced rate
 
-# What isolation keeps, in the record of the monitor. t_start: time of the first sample, s; substep: number
-# of this sample in its frame; exceeded: which tests have exceeded their bounds since the alarm.
-ISOLATION_FIELDS = {"t_start": float, "substep": int, "exceeded": (int, N_TESTS)}
-
 
 # One sample: test, compare, isolate, replace
 
@@ -84,7 +82,7 @@ ISOLATION_FIELDS = {"t_start": float, "substep": int, "exceeded": (int, N_TESTS)
 @kernel
 def expect_pressure(mon, pressure):
     """Predict the manifold pressure, inHg, from the command of the law in charge of the engine."""
-    mon.y_pred[MANIFOLD] = pressure
+    mon.sample.y_pred[MANIFOLD] = pressure
 
 
 @kernel
@@ -97,7 +95,7 @@ def check_sensors(mon, pred, measured, verdict, bank, bound, dt, t):
     sample before, which `store_sample` replaces last, by readings that are then without the broken sensors.
     """
     y = measured.signal
-    if not mon.stage:
+    if not mon.dynamics.stage:
         start_monitor(mon, y, measured.force, t)
     else:
         if mon.substep == 0:
@@ -122,7 +120,7 @@ def check_sensors(mon, pred, measured, verdict, bank, bound, dt, t):
 def start_monitor(mon, y, force, t):
     """Start with the first sample y, force (3,) m/s2, at t s: no earlier sample can be compared with it."""
     mon.t_start = t
-    mon.e_drift = mon.drift * t
+    mon.errors.e_drift = mon.errors.drift * t
     restart_comparison(mon)
     start_tests(mon, y, force)
     start_bounds(mon, y)
@@ -137,10 +135,11 @@ def isolate_sensor(mon, measured, verdict, bank, bound, dt, t):
     the innovation of the elapsed frame is new, and from FULL_STAGE on.
     """
     o = mon.output
-    worst = np.argmax(mon.ratio)
-    if mon.substep == 0 or mon.ratio[worst] > o.top_ratio:  # of the samples of this frame
+    ratio = mon.tests.ratio
+    worst = np.argmax(ratio)
+    if mon.substep == 0 or ratio[worst] > o.top_ratio:  # of the samples of this frame
         o.worst_test_index = worst
-        o.top_ratio = mon.ratio[worst]
+        o.top_ratio = ratio[worst]
     for i in range(N_SENSORS):
         if measured.missing[i] and o.isolated_sensor == NO_SENSOR:
             mark_isolated(mon, verdict, i, t)
@@ -152,7 +151,7 @@ def isolate_sensor(mon, measured, verdict, bank, bound, dt, t):
         mon.initial.E_alarm = mon.initial.E
     if o.alarmed:
         filter_beyond(mon, measured.signal)
-        if mon.substep == 0 and mon.stage == FULL_STAGE:
+        if mon.substep == 0 and mon.dynamics.stage == FULL_STAGE:
             judge_gyros(mon, bank, bound, dt)
         latch_exceeded(mon)
         if SPEED_TEST <= o.alarm_test <= BETA_TEST:
@@ -209,8 +208,8 @@ def add_turn(mon, att, y):
     if too_steep(mon, y):
         attitude.restart(att)
         return
-    attitude.add_turn(att, mon.residual)
-    mon.turn_max = att.turn_max
+    attitude.add_turn(att, mon.tests.residual)
+    mon.course.turn_max = att.turn_max
 
 
 # What other parts of the diagnosis read of the monitor
@@ -226,7 +225,7 @@ def has_alarm(mon):
 def doubts_gyros(mon):
     """Whether a gyro may be the cause of the alarm of the surfaces. It is false for a monitor that is not
     enabled, whose `noisy` is 0."""
-    return mon.config.noisy == 1 and mon.gyros_excluded == 0
+    return mon.config.noisy == 1 and mon.dynamics.gyros_excluded == 0
 
 
 @kernel
@@ -288,13 +287,14 @@ def estimate_reading(mon, pred, y, i):
     """
     if i < 3:
         return estimate_rate(mon, pred, i)
-    rho = 2.0 * mon.y_past[I_QDYN] / mon.y_past[I_AIRSPEED] ** 2
+    sample = mon.sample
+    rho = 2.0 * sample.y_past[I_QDYN] / sample.y_past[I_AIRSPEED] ** 2
     if i == I_AIRSPEED:
         return np.sqrt(max(2.0 * y[I_QDYN] / rho, MIN_AIRSPEED_MPS**2))
     if i == I_QDYN:
         return 0.5 * rho * y[I_AIRSPEED] ** 2
-    back = mon.h / VANE_RETURN_S if i in (I_ALPHA, I_BETA) else 0.0
-    return mon.y_pred[i] + back * (mon.config.y_trim[i] - mon.y_pred[i])
+    back = mon.config.h / VANE_RETURN_S if i in (I_ALPHA, I_BETA) else 0.0
+    return sample.y_pred[i] + back * (mon.config.y_trim[i] - sample.y_pred[i])
 
 
 @kernel
@@ -311,13 +311,14 @@ def estimate_rate(mon, pred, i):
     gain residual / h.
     """
     gain = mon.config.rate_gain
+    h = mon.config.h
     acc = pred.f[i]
     for s, u in enumerate(pred.u_old):
         acc += pred.G[i, s] * u
     if mon.output.keeps_surface:
         acc += pred.F_known[i] - pred.means.F[i]
-    rate = gain * mon.residual[i] / mon.h
+    rate = gain * mon.tests.residual[i] / h
     if not mon.gyro[i].replaced and gain < 1.0:
-        rate = FILTER_POLES_PER_S[RATE_POLE] * mon.r[i, RATE_POLE]
+        rate = FILTER_POLES_PER_S[RATE_POLE] * mon.tests.r[i, RATE_POLE]
     mon.gyro[i].replaced = 1
-    return mon.y_past[i] + rate + mon.h * acc
+    return mon.sample.y_past[i] + rate + h * acc

@@ -1,4 +1,4 @@
-"""The sensor monitor's record, as it follows from what a scenario declares. Letters as in redundancy.py."""
+"""The sensor monitor's record, as it follows from what a scenario declares."""
 
 from math import exp
 from typing import Any, cast
@@ -17,7 +17,7 @@ from beaver_ftc.plant.instruments import ENGINE_SPEED, MANIFOLD, PHI, SENSORS
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.sensors import frames_apart
 
-# Errors of a reading: field of the record -> name in the declaration
+# Errors of a reading: field of `errors` -> name in the declaration
 ERRORS = {"e_zero": "worst", "e_slope": "slope", "const": "steady"}
 MAX_AIRSPEED_OVER_TRIM = 1.4  # largest airspeed of a flight, as a share of that in trim
 # Rate at which the attitude corrects a replaced body rate, if noise or rounding of the attitude is declared
@@ -43,18 +43,23 @@ def configure_sensor_monitor(monitor: np.void, declared: Declared, design: np.vo
     engine = declared.aircraft.has_engine_instruments
     h = 1.0 / declared.rate_hz / declared.substeps
     gust_max, gust_change = bound_gusts(air, initial.airspeed_mps, h)
-    fill(config, substeps=declared.substeps, has_engine=engine)
+    fill(
+        config, substeps=declared.substeps, has_engine=engine, h=h,
+        decay=[exp(-lam * h) for lam in FILTER_POLES_PER_S],
+        g=GRAVITY_MPS2 * (1.0 + initial.altitude_m / EARTH_RADIUS_M) ** -2,
+    )  # fmt: skip
     config["D"] = air_rotation_slopes(DesignFunctions(np.array([design])), y)
     config["y_trim"][3:7] = y[:4]  # alpha, beta, airspeed, dynamic pressure: after the gyros in the readings
     fill(
-        monitor, h=h, decay=[exp(-lam * h) for lam in FILTER_POLES_PER_S],
-        g=GRAVITY_MPS2 * (1.0 + initial.altitude_m / EARTH_RADIUS_M) ** -2,
-        gust_max=gust_max, gust_change=gust_change, low_m=air.low_m, wind_max=declared.vertical_wind_mps,
-        max_airspeed_mps=MAX_AIRSPEED_OVER_TRIM * initial.airspeed_mps,
-        substep=declared.substeps - 1,  # the first JSBSim frame ends a frame of the loop
+        monitor["air"], gust_max=gust_max, gust_change=gust_change, low_m=air.low_m,
+        wind_max=declared.vertical_wind_mps, max_airspeed_mps=MAX_AIRSPEED_OVER_TRIM * initial.airspeed_mps,
     )  # fmt: skip
+    monitor["substep"] = declared.substeps - 1  # the first JSBSim frame ends a frame of the loop
     if engine:
-        monitor["y_pred"][[ENGINE_SPEED, MANIFOLD]] = initial.engine_rpm, initial.manifold_pressure_inhg
+        monitor["sample"]["y_pred"][[ENGINE_SPEED, MANIFOLD]] = (
+            initial.engine_rpm,
+            initial.manifold_pressure_inhg,
+        )
     configure_errors(monitor, declared)
 
 
@@ -63,15 +68,16 @@ def configure_errors(monitor: np.void, declared: Declared) -> None:
     a sample is a JSBSim frame, and a sensor may be read once in several. The attitude is noisy if an error of
     it changes: worst > steady."""
     config = monitor["config"]
+    errors = monitor["errors"]
     sensors = declared.sensors
-    h = float(monitor["h"])
-    fill(monitor, **{name: sensors.each(kind, SENSORS) for name, kind in ERRORS.items()})
+    h = float(config["h"])
+    fill(errors, **{name: sensors.each(kind, SENSORS) for name, kind in ERRORS.items()})
     drifts = [getattr(getattr(sensors.declared, name), "drift_rad_s", 0.0) for name in SENSORS]
-    monitor["drift"] = max(map(abs, drifts))
+    errors["drift"] = max(map(abs, drifts))
     for i, name in enumerate(SENSORS):
-        e = sensors[name]
-        config["n_frozen"][i] = n_frozen(e.noise, e.resolution) * frames_apart(i, h)
-    noisy = np.any((monitor["e_zero"] > monitor["const"])[PHI : PHI + 3])
+        error = sensors[name]
+        config["n_frozen"][i] = n_frozen(error.noise, error.resolution) * frames_apart(i, h)
+    noisy = np.any((errors["e_zero"] > errors["const"])[PHI : PHI + 3])
     fill(config, noisy=noisy, rate_gain=min(1.0, h * RATE_GAIN_PER_S) if noisy else 1.0)
 
 

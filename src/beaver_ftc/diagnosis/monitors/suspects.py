@@ -19,8 +19,15 @@ and flow_or_force.py, exclude some of them:
     any but equal          alpha, beta, airspeed, phi,  the tests that an error from the start does not
                            theta                        explain (initial_errors.py); a frozen suspect
 
-Letters: redundancy.py and initial_errors.py; h is a hypothesis. `mon.exceeded` (N_TESTS,): which tests have
-exceeded their bounds since the alarm; alarm: number of the test that raised it.
+    exceeded     (N_TESTS,): which tests have exceeded their bounds since the alarm
+    alarm        number of the test that raised it
+    i, j, m, d   sensor, axis or angle; test; pole of a filter; duplicate sensor
+    b, E, H      hypothesis of an error from the start, the bound on it as of the alarm, and its effect on a
+                 test through a filter (initial_errors.py)
+    r, B         filtered residual of a test (redundancy.py), and the bound on it for sound sensors
+    e            bound on the error of a reading, SI
+    V            airspeed in the sample before, m/s
+    mon          record of the monitor (records.py)
 """
 
 import numpy as np
@@ -81,15 +88,15 @@ def latch_exceeded(mon):
     little, so a residual of this sample, through filter 0, counts only if it is larger than COUPLING_SHARE
     times the largest of its three.
     """
-    exceeded = mon.exceeded
+    tests = mon.tests
     for j in range(N_TESTS):
-        counts = mon.ratio[j] > 1.0
+        counts = tests.ratio[j] > 1.0
         if j < SPEED_TEST:
             first = j - j % 3  # of the three axes, or angles
             for i in range(first, first + 3):
-                counts &= abs(mon.r[j, 0]) > COUPLING_SHARE * abs(mon.r[i, 0])
-        exceeded[j] |= counts
-    latch_refuted(mon, exceeded)
+                counts &= abs(tests.r[j, 0]) > COUPLING_SHARE * abs(tests.r[i, 0])
+        tests.exceeded[j] |= counts
+    latch_refuted(mon, tests.exceeded)
 
 
 @kernel
@@ -115,8 +122,8 @@ def find_suspects(mon):
     for i in range(N_SENSORS):
         if suspect[i] and stands_still(mon, i):
             return
-    for h, i in enumerate(INITIAL_SENSOR):
-        suspect[i] |= explains_exceeded(mon, h, alarm)
+    for b, i in enumerate(INITIAL_SENSOR):
+        suspect[i] |= explains_exceeded(mon, b, alarm)
 
 
 @kernel
@@ -128,19 +135,20 @@ def suspect_duplicate(mon, d):
         within its bound      suspected        suspected if its error may be hidden, if it is frozen, or if
                                                both have never agreed (an error from the first sample on)
 
-        hidden    |residual| - B <= HIDDEN_FACTOR max(B_i, e_i)
+        hidden    |residual| - B <= HIDDEN_FACTOR max(B_own, e_i)
 
     residual, B: of the comparison of both; the left side is the least error of the reading that explains it.
-    B_i: bound of the reading's own test; e_i: bound on the error of a sound reading.
+    B_own: bound of the reading's own test.
     """
     suspect = mon.output.suspect
+    tests = mon.tests
     i = COUNTERPART[d]
     own_test = COUNTERPART_TEST[d]
     j = N_EQUATIONS + d
-    least_error = abs(mon.residual[j]) - mon.B[j, 0]
-    hidden = least_error <= HIDDEN_FACTOR * max(mon.B[own_test, 0], mon.e[i])
-    suspect[DUPLICATE[d]] = not mon.exceeded[own_test]
-    suspect[i] = mon.exceeded[own_test] == 1 or hidden or is_frozen(mon, i) or not mon.agreed[d]
+    least_error = abs(tests.residual[j]) - tests.B[j, 0]
+    hidden = least_error <= HIDDEN_FACTOR * max(tests.B[own_test, 0], mon.errors.e[i])
+    suspect[DUPLICATE[d]] = not tests.exceeded[own_test]
+    suspect[i] = tests.exceeded[own_test] == 1 or hidden or is_frozen(mon, i) or not tests.agreed[d]
 
 
 @kernel
@@ -166,21 +174,22 @@ def suspect_attitude(mon):
     at fault instead, that with the largest ratio.
     """
     suspect = mon.output.suspect
-    ratio = mon.ratio[:ANGLE_TEST]
-    turns = mon.exceeded[:ANGLE_TEST]
-    angles = mon.exceeded[ANGLE_TEST:SPEED_TEST]
+    exceeded = mon.tests.exceeded
+    ratio = mon.tests.ratio[:ANGLE_TEST]
+    turns = exceeded[:ANGLE_TEST]
+    angles = exceeded[ANGLE_TEST:SPEED_TEST]
     refuted = mon.initial.refuted[H_PHI:, ANGLE_TEST:SPEED_TEST]
     frozen = last_frozen(mon, (PHI, THETA, PSI)) >= 0
     worst = np.argmax(ratio)
     for i in range(3):
         suspect[i] = alone(turns, i) and mon.gyro[i].verdict != GYRO_REFUTED and not frozen
         explains = explains_turns(mon, i)
-        k = PHI + i
+        sensor = PHI + i
         unshared = alone(angles, i) if i == 2 else alone(refuted[i], i)
         is_sole = unshared and (explains or angles[i] == 1)
         axis = worst if ratio[worst] > ratio[i] else i
-        early = 0 < mon.n_same[k] < mon.config.n_frozen[k] < N_FROZEN_NEVER
-        suspect[k] = (is_sole and mon.gyro[axis].verdict != GYRO_CONFIRMED) or (explains and early)
+        early = 0 < mon.sample.n_same[sensor] < mon.config.n_frozen[sensor] < N_FROZEN_NEVER
+        suspect[sensor] = (is_sole and mon.gyro[axis].verdict != GYRO_CONFIRMED) or (explains and early)
 
 
 @kernel
@@ -188,29 +197,29 @@ def explains_turns(mon, i):
     """Whether an error of angle i (phi, theta, psi) explains the tests of turning. Its size is limited by the
     residual of the angle's own test: as it is now, or as its residuals since the alarm have shown.
 
-    It does not if for an axis j, whose test has been exceeded, and some pole m both
+    It does not if for some axis j, whose test has been exceeded, and some pole m both
 
         now      |r_j| > c (|r_own| + B_own) + B_j + E H
-        since    |beyond_ij| > B_j + E H + c_max B_own + tilt swing_i
+        since    |beyond_j| > B_j + E H + c_max B_own + tilt swing
 
-    r_own, B_own rad: filtered residual of the angle's own test, and its bound; r_j, B_j: of the test of
-    turning; c: |turn_share| + tilt, rad/rad: the attitude may be off by tilt = e_phi + e_theta, rad; beyond,
-    c_max, swing: of `gyro_or_attitude.filter_beyond`; E, H: bound on an error of the angle from the start, as
-    of the alarm, and its effect (initial_errors.py); E is 0 for psi.
+    r_own, B_own rad: of the angle's own test; r_j, B_j: of the test of turning about axis j; c: |turn_share|
+    + tilt, rad/rad: the attitude may be off by tilt = e_phi + e_theta, rad; beyond, c_max, swing: of the
+    angle (`gyro_or_attitude.filter_beyond`); E is 0 for psi.
     """
+    tests = mon.tests
     own_test = ANGLE_TEST + i
-    h = min(H_PHI + i, N_INITIAL - 1)  # psi has no hypothesis: any h, as initial is 0
-    initial = mon.initial.E_alarm[h] if i < 2 else 0.0
-    tilt = mon.e[PHI] + mon.e[THETA]
+    angle = mon.angle[i]
+    b = min(H_PHI + i, N_INITIAL - 1)  # psi has no hypothesis: any b, as E is 0
+    E = mon.initial.E_alarm[b] if i < 2 else 0.0
+    tilt = mon.errors.e[PHI] + mon.errors.e[THETA]
     for j in range(3):
-        r = mon.r[j]
-        c = abs(turn_share(mon.y_past, j, i)) + tilt
-        for m in range(r.size):
-            B = mon.B[own_test, m]
-            sound = mon.B[j, m] + initial * mon.initial.H_m[h, j, m]
-            now = abs(r[m]) > c * (abs(mon.r[own_test, m]) + B) + sound
-            since = abs(mon.beyond[i, j, m]) > sound + mon.c_max[i, j] * B + tilt * mon.swing[i, m]
-            if mon.exceeded[j] and now and since:
+        c = abs(turn_share(mon.sample.y_past, j, i)) + tilt
+        for m in range(tests.r.shape[1]):
+            B = tests.B[own_test, m]
+            sound = tests.B[j, m] + E * mon.initial.H_m[b, j, m]
+            now = abs(tests.r[j, m]) > c * (abs(tests.r[own_test, m]) + B) + sound
+            since = abs(angle.beyond[j, m]) > sound + angle.c_max[j] * B + tilt * angle.swing[m]
+            if tests.exceeded[j] and now and since:
                 return False
     return True
 
@@ -225,7 +234,7 @@ def suspect_flow(mon, alarm):
     suspects.
     """
     suspect = mon.output.suspect
-    turns = mon.exceeded[:ANGLE_TEST]
+    turns = mon.tests.exceeded[:ANGLE_TEST]
     by_gyro = alarm > SPEED_TEST and turns.any()
     flow = SENSOR_OF[alarm]
     for i in range(3 if alarm > SPEED_TEST else 0):
@@ -234,27 +243,32 @@ def suspect_flow(mon, alarm):
         suspect_accelerometers(mon)
         suspect[flow] = 1
     for i in range(N_SENSORS):
-        suspect[i] &= not mon.cleared[i]
+        suspect[i] &= not mon.course.cleared[i]
 
 
 @kernel
 def gyro_hidden(mon, j, i):
     """Whether an error of gyro i may explain the test j of the flow while it is hidden in the test of its
-    axis: |r_j| <= k B_j + HIDDEN_FACTOR |share| B_i for each pole.
+    axis: |r_j| <= factor B_j + HIDDEN_FACTOR |share| B_i for each pole.
 
         alpha' = q - tan(beta) (p cos(alpha) + r sin(alpha)) + ...
         beta' = p sin(alpha) - r cos(alpha) + ...
 
     share: of the error of p, q or r in the flow's rate, by these equations. The gyro across the flow (q for
-    the incidence, r for the sideslip) counts with a share of 1 and k = HIDDEN_FACTOR; for the others k = 1,
-    and q does not turn the sideslip.
+    the incidence, r for the sideslip) counts with a share of 1 and factor = HIDDEN_FACTOR; for the others
+    factor = 1, and q does not turn the sideslip.
     """
-    z = unit(mon.y_past[I_ALPHA])
-    t = np.tan(mon.y_past[I_BETA])
-    share = (t * z.real, 1.0, t * z.imag)[i] if j == ALPHA_TEST else (z.imag, 0.0, 1.0)[i]
+    tests = mon.tests
+    alpha = unit(mon.sample.y_past[I_ALPHA])
+    tan_beta = np.tan(mon.sample.y_past[I_BETA])
+    if j == ALPHA_TEST:
+        share = (tan_beta * alpha.real, 1.0, tan_beta * alpha.imag)[i]
+    else:
+        share = (alpha.imag, 0.0, 1.0)[i]
     across = i == j - SPEED_TEST  # q (1) for the incidence, r (2) for the sideslip
-    k = HIDDEN_FACTOR if across else 1.0
-    return (across or i != 1) and not exceeds(mon.r[j], k, mon.B[j], HIDDEN_FACTOR * abs(share), mon.B[i])
+    factor = HIDDEN_FACTOR if across else 1.0
+    shows = exceeds(tests.r[j], factor, tests.B[j], HIDDEN_FACTOR * abs(share), tests.B[i])
+    return (across or i != 1) and not shows
 
 
 @kernel
@@ -271,10 +285,10 @@ def suspect_accelerometers(mon):
     the flow. plane: dv turned by beta; its imaginary part is along the second body axis. body: then turned by
     alpha; its parts are along the first and the third body axis.
     """
-    y = mon.y_past
-    dV = mon.flow[0]
-    da = mon.flow[1]
-    db = mon.flow[2]
+    y = mon.sample.y_past
+    dV = mon.course.flow[0]
+    da = mon.course.flow[1]
+    db = mon.course.flow[2]
     V = speed(y)
     frozen = last_frozen(mon, FORCES)
     plane = complex(dV.r_sum, V * db.r_sum) * unit(y[I_BETA])
@@ -293,17 +307,19 @@ def suspect_lone(mon, alarm):
     The alarm of the density suspects the airspeed, too, unless such an error would exceed the bound of the
     airspeed's own test while that test shows none:
 
-        |r_density| > 2 HIDDEN_FACTOR (1 + e) / V B_speed + e H        for some pole
+        |r| > 2 HIDDEN_FACTOR (1 + E) / V B_speed + E H        for some pole
 
-    e: bound on an error of the airspeed from the start, a share; H: its effect on the density. The test of a
-    frozen airspeed need not show an error, so an airspeed whose reading has just repeated is suspected.
+    r: of the density; E, H: of the hypothesis H_AIRSPEED, E a share, H on the density. The test of a frozen
+    airspeed need not show an error, so an airspeed whose reading has just repeated is suspected.
     """
     suspect = mon.output.suspect
-    suspect[SENSOR_OF[alarm]] = alarm >= RPM_TEST or alone(mon.exceeded[:RPM_TEST], alarm)
+    tests = mon.tests
+    sample = mon.sample
+    suspect[SENSOR_OF[alarm]] = alarm >= RPM_TEST or alone(tests.exceeded[:RPM_TEST], alarm)
     if alarm == DENSITY_TEST:
-        e = mon.initial.E_alarm[H_AIRSPEED]
+        E = mon.initial.E_alarm[H_AIRSPEED]
         H = mon.initial.H_m[H_AIRSPEED, alarm]
         # 2: a relative change of the airspeed changes log(density) by twice as much
-        k = 2.0 * HIDDEN_FACTOR * (1.0 + e) / speed(mon.y_past)
-        hidden = not exceeds(mon.r[alarm], k, mon.B[SPEED_TEST], e, H)
-        suspect[I_AIRSPEED] = mon.exceeded[SPEED_TEST] == 1 or hidden or mon.n_same[I_AIRSPEED] > 0
+        factor = 2.0 * HIDDEN_FACTOR * (1.0 + E) / speed(sample.y_past)
+        hidden = not exceeds(tests.r[alarm], factor, tests.B[SPEED_TEST], E, H)
+        suspect[I_AIRSPEED] = tests.exceeded[SPEED_TEST] == 1 or hidden or sample.n_same[I_AIRSPEED] > 0

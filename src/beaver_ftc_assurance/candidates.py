@@ -77,7 +77,7 @@ def situation_of(tape: Tape, scenario: Scenario, rate: float) -> Situation:
     coupled = declared_errors_of(frame).c * rate**2
     return Situation(
         G=frame.mean_G, u=frame.expected_u_rad, x=frame.rates_rad_s, rate=rate,
-        bound=bound.eta_bar_rad_s2 + coupled + 2.0 * bound.changing_gyro_error_bound_rad_s / dt,
+        bound=bound.eta_bar_rad_s2 + coupled + 2.0 * bound.gyro_change_rad_s / dt,
         stops=np.array([actuators.low_rad, actuators.high_rad]), approach=actuators.approach,
         step=actuators.step_rad, instants=scenario.substeps,
         in_blocks=frame.diagnosis.types_config.frames_per_block > 1, dt=dt,
@@ -112,10 +112,10 @@ def faults_left(diagnosis: DiagnosisReadout) -> Iterator[tuple[int, int]]:
     layout = diagnosis.layout
     for s, surface in enumerate(diagnosis.surface_fault_types):
         if not diagnosis.diagnoses_all_types:
-            e = layout.loss_estimator_index_by_surface[s]
+            e = layout.loss_estimator[s]
             if e >= 0 and not estimators[e].is_excluded:
                 yield s, LOSS
-        elif not estimators[layout.position_estimator_index_by_surface[s]].is_excluded:
+        elif not estimators[layout.position_estimator[s]].is_excluded:
             yield from ((s, kind) for kind in np.flatnonzero(~surface.is_type_excluded).tolist())
 
 

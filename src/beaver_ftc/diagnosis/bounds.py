@@ -80,10 +80,10 @@ def bound_dtype(n: int, boxes: int) -> np.dtype:
                          deflection (rad/s2 per rad), at the command (rad/s2); means over the frame
     extra                by how much the map's error, with a surface at each share of its travel, exceeds that
                          in eta_bar, rad/s2; mean over the frame
-    const, earth_rate_rad_s, inertia_coupling_error_share: b, w_E, c of `add_published_bound`
+    const, earth_rate_rad_s, coupling_share: b, w_E, c of `add_published_bound`
     """
     return record(
-        inertia_coupling_error_share=3, const=3, earth_rate_rad_s=float, declared_errors=errors_dtype(n),
+        coupling_share=3, const=3, earth_rate_rad_s=float, declared_errors=errors_dtype(n),
         error_map=map_dtype(n, boxes), eta_bar=3, eta_now=3, n_gyro=3, n_old=3, nu_max=3, has_eG=int,
         eG=(3, n), eGu=(3, n), extra=(MAX_LEVELS, 3),
     )  # fmt: skip
@@ -249,7 +249,7 @@ def fill_bound(bound, model, meas, u):
         look_up_map(emap, x, y, u, err.du)
         for i in range(3):
             eta[i] += emap.e_now[i]
-    c = bound.inertia_coupling_error_share
+    c = bound.coupling_share
     b = bound.const
     w_E = bound.earth_rate_rad_s
     add_published_bound(err.x[WORST], model, c, b, w_E, eta)

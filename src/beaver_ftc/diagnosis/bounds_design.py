@@ -53,7 +53,7 @@ def configure_bound(bound: np.void, declared: Declared, model: np.void) -> None:
     fill_errors(err, declared, model)
     fill_engine_errors(err, declared)
     fill(
-        bound, inertia_coupling_error_share=declared.coupling, earth_rate_rad_s=EARTH_RATE_RAD_S, const=const,
+        bound, coupling_share=declared.coupling, earth_rate_rad_s=EARTH_RATE_RAD_S, const=const,
         has_eG=err["given"] and all_types,
     )  # fmt: skip
 

@@ -35,13 +35,13 @@ class IsolationEstimator(NamedTuple):
     parity_direction: np.ndarray
 
 
-class LayoutOfAllSurfaces(NamedTuple):
+class SurfaceLayout(NamedTuple):
     """Layout of the surfaces: the axis that each turns most, and the number of the estimator of its loss and
     of its position, -1 where there is none."""
 
-    dominant_axis_by_surface: tuple[int, ...]
-    loss_estimator_index_by_surface: tuple[int, ...]
-    position_estimator_index_by_surface: tuple[int, ...]
+    dominant_axis: tuple[int, ...]
+    loss_estimator: tuple[int, ...]
+    position_estimator: tuple[int, ...]
 
 
 class FaultTypesConfig(NamedTuple):
@@ -87,26 +87,26 @@ class SurfaceFaultTypes(NamedTuple):
 class DeclaredBounds(NamedTuple):
     """The declared uncertainty, by axis (3,).
 
-    eta_bar_rad_s2                     bound on the model's error, mean over the frame
-    changing_gyro_error_bound_rad_s    bound on the changing part of a gyro's error
-    inertia_coupling_error_share,
-    constant_error_rad_s2              the c and b of eta_bar (bounds.py)
-    earth_rate_rad_s                   rate of the Earth, a scalar
-    gyro_error_bound_at_rest_rad_s,
-    gyro_error_bound_per_rate          e_0, e_1: the error of a gyro is at most e_0 + e_1 |rate|
-    constant_gyro_error_bound_rad_s    the part of e_0 that does not change
+    eta_bar_rad_s2         bound on the model's error, mean over the frame
+    gyro_change_rad_s      bound on the changing part of a gyro's error
+    coupling_share,
+    constant_rad_s2        the c and b of eta_bar (bounds.py)
+    earth_rate_rad_s       rate of the Earth, a scalar
+    gyro_error_rad_s,
+    gyro_slope             e_0, e_1: the error of a gyro is at most e_0 + e_1 |rate|
+    gyro_constant_rad_s    the part of e_0 that does not change
 
     The last three are 0 if no error is declared.
     """
 
     eta_bar_rad_s2: np.ndarray
-    changing_gyro_error_bound_rad_s: np.ndarray
-    inertia_coupling_error_share: np.ndarray
-    constant_error_rad_s2: np.ndarray
+    gyro_change_rad_s: np.ndarray
+    coupling_share: np.ndarray
+    constant_rad_s2: np.ndarray
     earth_rate_rad_s: float
-    gyro_error_bound_at_rest_rad_s: np.ndarray
-    constant_gyro_error_bound_rad_s: np.ndarray
-    gyro_error_bound_per_rate: np.ndarray
+    gyro_error_rad_s: np.ndarray
+    gyro_slope: np.ndarray
+    gyro_constant_rad_s: np.ndarray
 
 
 class GustReadout(NamedTuple):
@@ -120,50 +120,50 @@ class GustReadout(NamedTuple):
 class StatisticalHypothesis(NamedTuple):
     """A fault that the statistical test compares with health.
 
-    hypothesis_kind    LOSS, or a kind of blocks.py
+    kind               LOSS, or a kind of blocks.py
     surface, axis      numbers of its surface, or -1, and of its axis
     may_raise_alarm    whether its score counts for the alarm
     score_in_std       largest normalised evidence over all onsets, standard deviations, as the alarm level
     """
 
-    hypothesis_kind: int
+    kind: int
     surface: int
     axis: int
     may_raise_alarm: bool
     score_in_std: float
 
 
-class HypothesisTestsByOnset(NamedTuple):
+class OnsetTests(NamedTuple):
     """Tests by hypothesis and onset, (hypotheses, N_SLOTS) each.
 
-    score                                  normalised evidence, standard deviations
-    supporting_correlation_sign            sign of the correlation N that supports the hypothesis, 0: either
-    correlation_predictable_in_calm_air    part of N that air calmer than declared explains
-    correlation_from_coarse_gust           part of N that a gust explains which vanes show coarsely
+    score          normalised evidence, standard deviations
+    sign           sign of the correlation N that supports the hypothesis, 0: either
+    calm_part      part of N that air calmer than declared explains
+    coarse_part    part of N that a gust explains which vanes show coarsely
     """
 
     score: np.ndarray
-    supporting_correlation_sign: np.ndarray
-    correlation_predictable_in_calm_air: np.ndarray
-    correlation_from_coarse_gust: np.ndarray
+    sign: np.ndarray
+    calm_part: np.ndarray
+    coarse_part: np.ndarray
 
 
 class StatisticalBlock(NamedTuple):
     """One Kalman filter of the statistical detector and the hypotheses on its axes.
 
-    axis_indices                         the axes of its states
-    drift_correlation_length_m           length over which the drift returns to zero, 0 for a random walk
-    factor_on_gust_drift_intensity       Q_scale, on the intensity of the drift by gusts
-    regressor_coefficient_error_bound    (regressors,): tolerance of each unknown constant
-    hypotheses, hypothesis_tests_by_onset
+    axes                  the axes of its states
+    drift_length_m        length over which the drift returns to zero, 0 for a random walk
+    gust_drift_factor     Q_scale, on the intensity of the drift by gusts
+    tolerance             (regressors,): bound on each unknown constant
+    hypotheses, onset_tests
     """
 
-    axis_indices: tuple[int, ...]
-    drift_correlation_length_m: float
-    factor_on_gust_drift_intensity: float
-    regressor_coefficient_error_bound: np.ndarray
+    axes: tuple[int, ...]
+    drift_length_m: float
+    gust_drift_factor: float
+    tolerance: np.ndarray
     hypotheses: tuple[StatisticalHypothesis, ...]
-    hypothesis_tests_by_onset: HypothesisTestsByOnset
+    onset_tests: OnsetTests
 
 
 class SensorTest(NamedTuple):
@@ -231,12 +231,11 @@ class DiagnosisReadout(Readout):
     detected, detected_at_s      whether the alarm of the surfaces stands; when it was raised, s
     isolated_estimator           number of the estimator whose fault is isolated, NOT_ISOLATED or
                                  UNANTICIPATED
-    n_frames_in_block_so_far     frames that the block in progress has so far
+    frames_so_far                frames that the block in progress has so far
     statistical_alarm_level      statistic at which the statistical detector raises its alarm, standard
                                  deviations
-    acceleration_variance_from_input_noise
-                                 variance by the noise of the model's own inputs and of the gust estimate,
-                                 (3,) (rad/s2)^2
+    input_noise_variance         variance of the acceleration by the noise of the model's own inputs and of
+                                 the gust estimate, (3,) (rad/s2)^2
     """
 
     enabled = value(bool, "config", "enabled")
@@ -245,15 +244,15 @@ class DiagnosisReadout(Readout):
     detected = value(bool, "verdict", "detected")
     detected_at_s = value(float, "verdict", "detected_at_s")
     isolated_estimator = value(int, "verdict", "isolated_estimator")
-    n_frames_in_block_so_far = value(int, "types", "block", "n_so_far")
+    frames_so_far = value(int, "types", "block", "n_so_far")
     statistical_alarm_level = value(float, "statistical", "test", "alarm_level")
-    acceleration_variance_from_input_noise = value(np.array, "statistical", "noise", "Q")
+    input_noise_variance = value(np.array, "statistical", "noise", "Q")
 
     @cached_property
-    def layout(self) -> LayoutOfAllSurfaces:
+    def layout(self) -> SurfaceLayout:
         """Axes and estimators of the surfaces."""
-        names = ("dominant_axis", "loss", "position")
-        return LayoutOfAllSurfaces(*(tuple(self._record["layout"][name].tolist()) for name in names))
+        paths = {"loss_estimator": "loss", "position_estimator": "position"}
+        return _read(SurfaceLayout, self._record["layout"], **paths)
 
     @cached_property
     def is_estimator_excluded(self) -> np.ndarray:
@@ -268,8 +267,7 @@ class DiagnosisReadout(Readout):
     @cached_property
     def types_config(self) -> FaultTypesConfig:
         """How fault types are examined."""
-        names = "single_instant n_substeps returns_lagged frames_per_block block_duration_s"
-        return _read(FaultTypesConfig, self._record["types"]["config"], names)
+        return _read(FaultTypesConfig, self._record["types"]["config"])
 
     @cached_property
     def surface_fault_types(self) -> tuple[SurfaceFaultTypes, ...]:
@@ -280,14 +278,17 @@ class DiagnosisReadout(Readout):
     def declared_bounds(self) -> DeclaredBounds:
         """The declared uncertainty."""
         errors = self._record["bound"]["declared_errors"]
-        gyro_errors = (errors[name][:3] * bool(errors["given"]) for name in ("e0", "steady", "e1"))
-        names = "eta_bar n_gyro inertia_coupling_error_share const earth_rate_rad_s"
-        return _read(DeclaredBounds, self._record["bound"], names, *gyro_errors)
+        e_0, e_1, constant = (errors[name][:3] * bool(errors["given"]) for name in ("e0", "e1", "steady"))
+        return _read(
+            DeclaredBounds, self._record["bound"], eta_bar_rad_s2="eta_bar", gyro_change_rad_s="n_gyro",
+            constant_rad_s2="const", gyro_error_rad_s=e_0, gyro_slope=e_1, gyro_constant_rad_s=constant,
+        )  # fmt: skip
 
     @cached_property
     def gust(self) -> GustReadout:
         """Gusts as the vanes see them."""
-        return _read(GustReadout, self._record["statistical"]["gust"]["output"], "gusty measured")
+        paths = {"is_turbulence_declared": "gusty", "subtracts_measured_gust": "measured"}
+        return _read(GustReadout, self._record["statistical"]["gust"]["output"], **paths)
 
     @cached_property
     def statistical_filters(self) -> tuple[StatisticalBlock, ...]:
@@ -376,48 +377,64 @@ def alarm_flags(fdi: np.void) -> tuple[np.int64, np.int64]:
     return fdi["verdict"]["detected"], fdi["sensor_monitor"]["output"]["alarmed"]
 
 
-def _read(kind: type[Read], record: np.void, names: str, *others: Any) -> Read:
-    """An object of a class, its first fields copied from the fields of a record that `names` lists in this
-    order, each turned into the type of the field (`a.b`: field b of field a); others: the values of the
-    further fields."""
-    hints = get_type_hints(kind).values()
-    copies = {np.ndarray: np.array}
-    found = (reduce(getitem, name.split("."), record) for name in names.split())
-    return kind(*(copies.get(hint, hint)(one) for hint, one in zip(hints, found, strict=False)), *others)
+def _read(kind: type[Read], record: np.void, **given: Any) -> Read:
+    """An object of a class. Each field is a copy of the record's field of this name, or of that at the path
+    that is given for it (`a.b`: field b of field a), in the type of the field; or it is another given value.
+    """
+
+    def one(name: str, hint: Any) -> Any:
+        found = given.get(name, name)
+        if not isinstance(found, str):
+            return found
+        return _COPIES.get(hint, hint)(reduce(getitem, found.split("."), record))
+
+    return kind(**{name: one(name, hint) for name, hint in get_type_hints(kind).items()})
+
+
+_COPIES: dict[Any, Callable[[Any], Any]] = {
+    np.ndarray: np.array, tuple[int, ...]: lambda values: tuple(values.tolist())
+}  # fmt: skip
 
 
 def _read_estimator(fie: np.void) -> IsolationEstimator:
     axes = tuple(np.flatnonzero(fie["skip"] == 0).tolist())
-    names = "hypothesis_kind theta_min theta_max excluded"
-    return _read(IsolationEstimator, fie, names, axes, fie["parity_direction"].copy())
+    return _read(IsolationEstimator, fie, is_excluded="excluded", active_axes=axes)
 
 
 def _read_surface(srf: np.void) -> SurfaceFaultTypes:
-    actuator = _read(Actuator, srf["actuator"], "stop_lo stop_hi runaway slow_step near")
+    actuator = _read(
+        Actuator, srf["actuator"], travel_low_rad="stop_lo", travel_high_rad="stop_hi",
+        min_runaway_rate_rad_s="runaway", slow_step_rad="slow_step", lag_distance_rad="near",
+    )  # fmt: skip
     return SurfaceFaultTypes(actuator, srf["sets"]["excluded"].astype(bool))
 
 
 def _read_block(blk: np.void) -> StatisticalBlock:
     hypotheses = tuple(
-        _read(StatisticalHypothesis, hyp, "kind surface axis alarms score")
+        _read(StatisticalHypothesis, hyp, may_raise_alarm="alarms", score_in_std="score")
         for hyp in blk["hypothesis"][: blk["n_h"]]
     )
     n = len(hypotheses)
-    tests = (blk["tests"][name].reshape(-1, N_SLOTS)[:n].copy() for name in ("score", "sign", "N_p", "N_c"))
-    return StatisticalBlock(
-        tuple(blk["axes"][: blk["n"]].tolist()),
-        float(blk["drift_correlation_length_m"]), float(blk["Q_scale"]),
-        blk["tol"][: blk["n_Z"]].copy(),
-        hypotheses, HypothesisTestsByOnset(*tests),
+    names = {"score": "score", "sign": "sign", "calm_part": "N_p", "coarse_part": "N_c"}
+    tests = {field: blk["tests"][name].reshape(-1, N_SLOTS)[:n].copy() for field, name in names.items()}
+    return _read(
+        StatisticalBlock, blk, axes=tuple(blk["axes"][: blk["n"]].tolist()),
+        gust_drift_factor="Q_scale",
+        tolerance=blk["tol"][: blk["n_Z"]].copy(), hypotheses=hypotheses, onset_tests=OnsetTests(**tests),
     )  # fmt: skip
 
 
 def _read_sensor_monitor(mon: np.void) -> SensorMonitor:
     output = mon["output"]
-    names = ("residual", "per_s", "per_sample", "gust", "r", "B")
-    worst = SensorTest(*(mon["tests"][name][output["worst_test_index"]].copy() for name in names))
-    fields = (
-        "config.enabled output.alarmed output.worst_test_index output.top_ratio output.isolated_sensor "
-        "config.h air.gust_change sample.y_pred errors.e"
-    )
-    return _read(SensorMonitor, mon, fields, worst, output["is_reading_unused"].astype(bool))
+    names = {
+        "residual": "residual", "bound_per_s": "per_s", "bound_per_sample": "per_sample", "gust_gain": "gust",
+        "filtered_residual": "r", "filtered_bound": "B",
+    }  # fmt: skip
+    worst = {field: mon["tests"][name][output["worst_test_index"]].copy() for field, name in names.items()}
+    return _read(
+        SensorMonitor, mon, enabled="config.enabled", has_raised_alarm="output.alarmed",
+        worst_test_index="output.worst_test_index", top_ratio="output.top_ratio",
+        isolated_sensor_index="output.isolated_sensor", sample_time_s="config.h",
+        gust_change_mps="air.gust_change", predicted_reading="sample.y_pred", reading_bound="errors.e",
+        worst_test=SensorTest(**worst), is_reading_unused=output["is_reading_unused"].astype(bool),
+    )  # fmt: skip

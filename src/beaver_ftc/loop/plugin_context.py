@@ -29,7 +29,7 @@ def context_of(frames: np.ndarray, scenario: Scenario, trim: Trim, options: Mapp
         trim_rad=trim.command.copy(),
         travel_rad=np.array([layout["low"], layout["high"]]),
         constant_rad_s2=constant,
-        inertia_coupling=bound["inertia_coupling_error_share"].copy(),
+        inertia_coupling=bound["coupling_share"].copy(),
         surfaces=aircraft.surfaces,
         leading=(int(layout["main"][0]), int(layout["main"][1]), int(layout["main"][2])),
         options=dict(options),

@@ -45,7 +45,7 @@ def alarm_evidence(
     b, h = _largest_score(diagnosis.statistical_filters)
     block = diagnosis.statistical_filters[b]
     hypothesis = block.hypotheses[h]
-    slot = int(np.argmax(block.hypothesis_tests_by_onset.score[h]))
+    slot = int(np.argmax(block.onset_tests.score[h]))
     first = next((r for r in range(k, tape.first, -1) if restarting_slot(r - tape.since) == slot), None)
     if first is None or k - first >= MAX_WRITTEN_FRAMES:
         return None
@@ -87,9 +87,7 @@ def likelihood_shares(diagnosis: DiagnosisReadout, surfaces: Sequence[str]) -> d
 def _share_column(hypothesis: StatisticalHypothesis, surfaces: Sequence[str]) -> str:
     """The column of the log for a hypothesis."""
     name = (
-        f"{AXES[hypothesis.axis]}_step"
-        if hypothesis.hypothesis_kind == STEP
-        else f"{surfaces[hypothesis.surface]}_loss"
+        f"{AXES[hypothesis.axis]}_step" if hypothesis.kind == STEP else f"{surfaces[hypothesis.surface]}_loss"
     )
     return f"{name}_likelihood_share"
 
@@ -114,10 +112,10 @@ def _likelihood_ratio(history: History, test: tuple[int, int, int], rows: range)
     diagnosis = tape.alarm.diagnosis
     block = diagnosis.statistical_filters[b]
     before, now = _before_and_now(tape, b, h, rows)
-    moved = _affected_axes(before, now, len(block.axis_indices))
+    moved = _affected_axes(before, now, len(block.axes))
     states = [*moved, *(2 + i for i in moved)]
-    axes = [block.axis_indices[i] for i in moved]
-    tolerance = block.regressor_coefficient_error_bound
+    axes = [block.axes[i] for i in moved]
+    tolerance = block.tolerance
     known = [j for j in np.flatnonzero(tolerance > 0.0).tolist() if now["g_Z"][:, j][:, moved].any()]
     regressors = air = None
     drift = _a_frame_later(dt * before["Q_d"][:, moved][:, :, moved])
@@ -127,13 +125,13 @@ def _likelihood_ratio(history: History, test: tuple[int, int, int], rows: range)
     if diagnosis.gust.is_turbulence_declared:
         air = now["air"][:, axes]
         leap = now["leap"][:, axes][:, :, axes]  # the gust's axes turn
-        drift += block.factor_on_gust_drift_intensity * leap
-    sense = block.hypothesis_tests_by_onset.supporting_correlation_sign[h, slot]
+        drift += block.gust_drift_factor * leap
+    sense = block.onset_tests.sign[h, slot]
     supporting = [now[name] for name in _supporting_parts(block, h, slot)]
     series = Inputs(
         signature=now["signature"][:, moved], jitter=dt * dt * before["Q_x"][:, moved], drift=drift,
         bounded=before["bounded"][:, axes], pace=before["eta_rate"], known=regressors, air=air,
-        keep=before["a"] if block.drift_correlation_length_m > 0.0 else None,
+        keep=before["a"] if block.drift_length_m > 0.0 else None,
         foreseen=np.sum(supporting, axis=0)[:, moved] if supporting else None,
     )  # fmt: skip
     Y, P = _states_of({name: values[0] for name, values in before.items()}, states, known)
@@ -168,12 +166,12 @@ def _a_frame_later(drift: np.ndarray) -> np.ndarray:
 def _supporting_parts(block: StatisticalBlock, h: int, slot: int) -> list[str]:
     """The recorded quantities of the predictable parts of the innovation whose correlation has the sign that
     supports the fault; none if either sign does."""
-    tests = block.hypothesis_tests_by_onset
+    tests = block.onset_tests
     predictable = {
-        "p": tests.correlation_predictable_in_calm_air,
-        "g_c": tests.correlation_from_coarse_gust,
+        "p": tests.calm_part,
+        "g_c": tests.coarse_part,
     }
-    sense = tests.supporting_correlation_sign[h, slot]
+    sense = tests.sign[h, slot]
     return [name for name, values in predictable.items() if sense * values[h, slot] > 0.0]
 
 

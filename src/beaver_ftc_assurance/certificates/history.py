@@ -212,9 +212,9 @@ def declared_errors_of(frame: FrameReadout) -> DeclaredErrors:
         size["Rpq"] + size["Rqr"],
     )
     return DeclaredErrors(
-        c=bound.inertia_coupling_error_share * np.abs([inertia.Pqr, inertia.Qpr, inertia.Rpq]),
-        b=bound.constant_error_rad_s2, g=np.maximum(gains, 1.0), o=bound.gyro_error_bound_at_rest_rad_s,
-        B=bound.constant_gyro_error_bound_rad_s, m=bound.gyro_error_bound_per_rate,
+        c=bound.coupling_share * np.abs([inertia.Pqr, inertia.Qpr, inertia.Rpq]),
+        b=bound.constant_rad_s2, g=np.maximum(gains, 1.0), o=bound.gyro_error_rad_s,
+        B=bound.gyro_constant_rad_s, m=bound.gyro_slope,
         omega_E=bound.earth_rate_rad_s,
     )  # fmt: skip
 
@@ -227,7 +227,7 @@ def in_blocks(history: History) -> History:
     length = diagnosis.types_config.frames_per_block
     if length == 1:
         return history
-    begin = (history.alarm + 1 - diagnosis.n_frames_in_block_so_far) % length
+    begin = (history.alarm + 1 - diagnosis.frames_so_far) % length
     blocks = replace(history, length=length, begin=begin)
     first_block = ceil((tape.first - begin) / length)
     skipped = begin + first_block * length - tape.first

@@ -36,7 +36,7 @@ def excluded_types(tape: Tape) -> Iterator[tuple[int, int, int]]:
     layout = tape.alarm.diagnosis.layout
     remaining = np.flatnonzero(~tape.last.diagnosis.is_estimator_excluded)
     for s, surface in enumerate(tape.last.diagnosis.surface_fault_types):
-        e = layout.position_estimator_index_by_surface[s]
+        e = layout.position_estimator[s]
         if tape.excluded[-1][e]:
             continue
         flags = np.vstack([tape.types[:, s] > 0, surface.is_type_excluded & (e in remaining)])
@@ -114,13 +114,13 @@ def hypothesis_of_type(history: History, surface: int, fault_type: int) -> Hypot
     diagnosis = tape.alarm.diagnosis
     assert row.deflection_relation is not None
     gain, theta_is_share, theta_span = row.deflection_relation
-    e = diagnosis.layout.position_estimator_index_by_surface[surface]
+    e = diagnosis.layout.position_estimator[surface]
     Gu = -tape.offset[:, e]
     G = tape.slope[:, e]
     spread = tape.spread[:, e]
     axes = diagnosis.estimators[e].active_axes
     if diagnosis.types_config.frames_per_block > 1:  # over a block, axes weigh a varying position differently
-        axes = (diagnosis.layout.dominant_axis_by_surface[surface],)
+        axes = (diagnosis.layout.dominant_axis[surface],)
     low, high = theta_span(*travel_rad(tape, surface))
     offset = (gain - 1.0) * Gu
     slope = Gu if theta_is_share else G

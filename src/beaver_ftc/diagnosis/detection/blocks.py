@@ -80,7 +80,7 @@ def block_dtype(size: BlockCapacity) -> np.dtype:
         # these, rad/s2, and whether that bound is for one surface anywhere in its travel
         source=int, m=(2, N_ROWS), eta=2, any_position=int,
         # correlation length of the drift, m, 0 for a random walk; factor on the intensity of a gust
-        drift_correlation_length_m=float, Q_scale=float,
+        drift_length_m=float, Q_scale=float,
         x_known=4, nu=2,  # state of the filter after known faults
         # in turbulence: filter without gust; lambda p, rad/s, and the sums pg, pp (`update_calm_part`)
         calm=record(**FILTER_FIELDS), p=2, pg=float, pp=float,

@@ -109,9 +109,9 @@ def configure_lengths(stat: np.void, V: float, rate_hz: float) -> None:
     if out["gusty"] and not out["measured"]:
         lengths.append((stat["block"][PITCH_BLOCK], rotations_m[1], rotations_m[1]))
     for b, longest_m, gust_m in lengths:
-        b["drift_correlation_length_m"] = derive_length(stat, V, rate_hz, float(longest_m))
+        b["drift_length_m"] = derive_length(stat, V, rate_hz, float(longest_m))
         if out["gusty"]:
-            b["Q_scale"] = (gust_m / b["drift_correlation_length_m"]) ** 2
+            b["Q_scale"] = (gust_m / b["drift_length_m"]) ** 2
 
 
 def derive_length(stat: np.void, V: float, rate_hz: float, longest_m: float) -> float:

@@ -178,9 +178,7 @@ def begin_rows(w, noise, rows, bound, model, meas, u):
     rows.Z[: rows.n] = 0.0
     add_constants(w, noise, rows, bound.declared_errors, model, meas, u)
     eta[:3] = 0.0
-    add_published_bound(
-        meas.x, model, bound.inertia_coupling_error_share, bound.const, bound.earth_rate_rad_s, eta
-    )
+    add_published_bound(meas.x, model, bound.coupling_share, bound.const, bound.earth_rate_rad_s, eta)
     for i in range(3):
         for s, du in enumerate(bound.declared_errors.du):
             eta[i] += noise.G_trim[i, s] * du

@@ -329,13 +329,13 @@ def fill_drift(noise, eta, blocks, gust, V, dt):
 
         Q_d,ij = Q_scale q_gust,ij + [i = j] q max(eta_i, MIN_ETA_RAD_S2)^2,      a = exp(-dt V / length)
 
-    i, j: axes of the block; Q_d, q_gust (rad/s2)2/s; V m/s; length m: `drift_correlation_length_m`, 0 for a
+    i, j: axes of the block; Q_d, q_gust (rad/s2)2/s; V m/s; length m: `drift_length_m`, 0 for a
     random walk, a = 1; q 1/s. The filter without gust has the second term alone.
     """
     gusty = gust.output.gusty
     for m, b in enumerate(blocks):
         reverts = m == REVERTING_BLOCK
-        length = b.drift_correlation_length_m
+        length = b.drift_length_m
         for i, axis in enumerate(b.axes[: b.n]):
             for j in range(b.n):
                 q_gust = unmeasured_drift(gust, V, axis, b.axes[j], reverts) if gusty else 0.0

@@ -54,9 +54,10 @@ AB_NOW, AB_PAST = 1.5, 0.5
 # from h v, which predicts the altitude, by at most h^2 (11 + 5) / 12 of the largest acceleration.
 POSITION_FACTOR = 4.0 / 3.0
 
-# Errors of the readings, SI. Declared: |error| <= e_zero + e_slope |y|, of which const does not change; drift,
-# rad/s, is that of the attitude. Bounds on them (see the top): e, n; e_drift, rad: the part of e by drift so
-# far; e_past, e_older: e in the sample before, and in that before it.
+# Errors of the readings, SI.
+#     e_zero, e_slope    declared: |error| <= e_zero + e_slope |y|; const: the part that does not change
+#     e, n               bounds on them (see the top); e_past, e_older: e of the two samples before
+#     drift, e_drift     drift of the attitude, rad/s, and the part of e by it so far, rad
 ERRORS_RECORD = record(
     e_zero=N_SENSORS, e_slope=N_SENSORS, const=N_SENSORS, drift=float,
     e=N_SENSORS, n=N_SENSORS, e_drift=float, e_past=N_SENSORS, e_older=N_SENSORS,

@@ -83,7 +83,7 @@ def _declared(scenario: "Scenario") -> tuple[Context, np.ndarray]:
     context = context_of(loop.frames, exact, loop.trimmed, {})
     diagnosis = FrameReadout(loop.frames[0]).diagnosis
     if diagnosis.gust.subtracts_measured_gust:
-        context = with_measured_gust(context, np.sqrt(diagnosis.acceleration_variance_from_input_noise))
+        context = with_measured_gust(context, np.sqrt(diagnosis.input_noise_variance))
     loop.release()
     return context, coefficients
 

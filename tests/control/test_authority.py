@@ -7,13 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from beaver_ftc.aircraft import YAW
 from beaver_ftc.aircraft.schema import ThrustSection
 from beaver_ftc.control import allocation, authority, laws
 from beaver_ftc.control.laws import reference
 from beaver_ftc.control.probe import advance_probe
 from beaver_ftc.control.thrust import set_up_engine
 from beaver_ftc.design.table import AIRSPEED
-from beaver_ftc.diagnosis.state import YAW
 from beaver_ftc.loop.assembly import frame_dtype
 from law_records import RUDDER, fields, new_control, put
 

@@ -14,7 +14,7 @@ from beaver_ftc.control.accommodation import (
 )
 from beaver_ftc.control.laws.effectiveness_estimator import OBSERVER_ERROR, observer_response
 from beaver_ftc.control.laws.evidence import accumulate, derive_fading, effectiveness_seen, is_effective
-from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
+from beaver_ftc.diagnosis.conclusion import NOT_ISOLATED, UNANTICIPATED
 from beaver_ftc.diagnosis.types import GIVE_UP, SCALE_COMMAND, SUBTRACT_OFFSET, WAIT_FOR_SURFACE
 from beaver_ftc.loop import frame as whole
 from beaver_ftc.loop.assembly import frame_dtype

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from beaver_ftc.control.accommodation import MODES, SUPERVISOR, mode_from, supervise
-from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
+from beaver_ftc.diagnosis.conclusion import NOT_ISOLATED, UNANTICIPATED
 from law_records import new_control
 
 NAMES = "detected isolated_estimator target accommodation_mode diagnoses_all_types isolated_surface"

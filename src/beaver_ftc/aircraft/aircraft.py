@@ -49,6 +49,7 @@ EARTH_RADIUS_M = 6_371_000.0  # mean radius: for a local plane and gravity with 
 
 
 AXES = ("p", "q", "r")
+ROLL, PITCH, YAW = range(3)
 THRUST_TERM = "CX_dpt"  # what the slipstream of a piston engine adds to the force along the body
 LEAST_THRUST = 0.01  # of the weight: what gives less is no engine to fly by
 MOMENTS, FORCES = ("Cl", "Cm", "Cn"), ("CX", "CY", "CZ")

@@ -30,10 +30,11 @@ Records among the arguments, and the file that defines each:
 
 import numpy as np
 
+from beaver_ftc.aircraft import PITCH
 from beaver_ftc.compiled import apart, copy, fill, kernel, record, sized
 from beaver_ftc.control.profile import clamp
 from beaver_ftc.design.model import unanticipated_pitch
-from beaver_ftc.diagnosis.state import PITCH, UNANTICIPATED
+from beaver_ftc.diagnosis.conclusion import UNANTICIPATED
 from beaver_ftc.diagnosis.types import GIVE_UP, SCALE_COMMAND
 from beaver_ftc.scenario.diagnosis import MODES, ControlConfig
 

@@ -18,12 +18,11 @@ Words for surfaces:
 
 import numpy as np
 
-from beaver_ftc.aircraft import AXES, Aircraft, main_surface_index_by_axis
+from beaver_ftc.aircraft import AXES, PITCH, ROLL, YAW, Aircraft, main_surface_index_by_axis
 from beaver_ftc.compiled import copy, fill, kernel, record, sized
 from beaver_ftc.control.accommodation import usable_effectiveness
 from beaver_ftc.control.authority import authority_shares
 from beaver_ftc.control.least_squares import problem_dtype
-from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
 from beaver_ftc.scenario.declared import Declared
 
 

@@ -12,8 +12,8 @@ outside of it.
 
 import numpy as np
 
+from beaver_ftc.aircraft import PITCH
 from beaver_ftc.compiled import kernel
-from beaver_ftc.diagnosis.state import PITCH
 from beaver_ftc.scenario.declared import Declared
 
 

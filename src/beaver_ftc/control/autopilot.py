@@ -30,6 +30,7 @@ by sideslip: rudder and dihedral.
 
 import numpy as np
 
+from beaver_ftc.aircraft import PITCH, ROLL, YAW
 from beaver_ftc.compiled import kernel
 from beaver_ftc.control.authority import attainable, remaining
 from beaver_ftc.control.envelope_protection import limit_airspeed_to_fly
@@ -43,7 +44,6 @@ from beaver_ftc.control.vertical_loops import (
     set_power,
 )
 from beaver_ftc.design.table import AIRSPEED, ALPHA, BETA
-from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
 
 MOST_SIDESLIP_RAD = 0.14  # largest sideslip to demand, in order to roll by it
 LEAST_COS_BANK = 0.1  # least divisor of the turn rate: 84 deg, beyond any bank that is demanded

@@ -23,6 +23,7 @@ roll: the outer loops demand sideslip, which rolls the aircraft.
 
 import numpy as np
 
+from beaver_ftc.aircraft import PITCH, YAW
 from beaver_ftc.aircraft.schema import MAX_EFFECTORS
 from beaver_ftc.compiled import apart, fill, kernel, record
 from beaver_ftc.control import least_squares, row_of
@@ -31,7 +32,6 @@ from beaver_ftc.control.least_squares import problem_dtype
 from beaver_ftc.control.power import WHOLE_RANGE_S
 from beaver_ftc.control.thrust import ENGINE, gained, look_up, power_for, set_up_engine
 from beaver_ftc.design.model import inertia_coefficients
-from beaver_ftc.diagnosis.state import PITCH, YAW
 from beaver_ftc.scenario.declared import Declared
 
 LEAST_LAG_S = 0.5  # The law assumes at least this lag, so that it integrates no faster.

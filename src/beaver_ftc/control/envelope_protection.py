@@ -21,6 +21,7 @@ from math import radians
 
 import numpy as np
 
+from beaver_ftc.aircraft import PITCH, ROLL, YAW
 from beaver_ftc.compiled import fill, kernel, record
 from beaver_ftc.control.allocation import within_stops
 from beaver_ftc.control.level_flight import THRUST, elevator_needed
@@ -28,7 +29,6 @@ from beaver_ftc.control.profile import SPEED, clamp
 from beaver_ftc.control.thrust import between
 from beaver_ftc.design.engine import SEA_LEVEL_DENSITY_KG_M3
 from beaver_ftc.design.table import AIRSPEED, QDYN
-from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
 from beaver_ftc.scenario.declared import Declared
 
 ACTING_S = 4.0  # time constant of the mean acting elevator, because gusts pitch within a second

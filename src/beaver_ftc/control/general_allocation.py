@@ -11,11 +11,11 @@ allocation.py, which has the words for surfaces and the records.
     probe            rad; if it is not 0, the stand-in is held at its trim + probe
 """
 
+from beaver_ftc.aircraft import PITCH
 from beaver_ftc.compiled import apart, kernel
 from beaver_ftc.control.allocation import within_stops
 from beaver_ftc.control.authority import remaining
 from beaver_ftc.control.least_squares import FREE, LOW, solve
-from beaver_ftc.diagnosis.state import PITCH
 
 RELUCTANT = 1e-4  # least factor on a backup's weight, when nothing is handed over to it; largest: 1 / it
 TINY = 1e-300  # in place of a divisor of zero

@@ -6,9 +6,9 @@
 Both M are in rad/s. ap: record AUTOPILOT (autopilot_setup.py). Other letters: autopilot.py.
 """
 
+from beaver_ftc.aircraft import ROLL, YAW
 from beaver_ftc.compiled import kernel
 from beaver_ftc.control.profile import BANK, HEADING, clamp
-from beaver_ftc.diagnosis.state import ROLL, YAW
 from beaver_ftc.plant.instruments import wrapped
 
 MOST_DRIFT_RAD_S = 0.1  # largest M of the turn rate: a bank that is held without a turn

@@ -29,14 +29,13 @@ from math import exp, radians
 
 import numpy as np
 
-from beaver_ftc.aircraft import Aircraft
+from beaver_ftc.aircraft import PITCH, Aircraft
 from beaver_ftc.aircraft.schema import MAX_LEVERS
 from beaver_ftc.compiled import fill, kernel, record
 from beaver_ftc.control import row_of
 from beaver_ftc.control.authority import remaining
 from beaver_ftc.control.slipstream_limit import ceiling, slipstream_limits
 from beaver_ftc.design.table import AIRSPEED
-from beaver_ftc.diagnosis.state import PITCH
 from beaver_ftc.scenario.declared import Declared
 
 LEAST_LACK_RAD_S2 = 0.05  # smallest shortfall in pitch that counts: 2 to 3 inHg give so much

@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from beaver_ftc.aircraft import YAW
 from beaver_ftc.compiled import kernel
 from beaver_ftc.design.engine import engine_power_kw, slipstream
 from beaver_ftc.design.table import AIRSPEED, DPT, QDYN
-from beaver_ftc.diagnosis.state import YAW
 from beaver_ftc.scenario.declared import Declared
 
 YAW_SHARE = 0.5  # share of the rudder's travel that engine power may need; the rest is there to fly with

@@ -19,12 +19,12 @@ Other letters: autopilot.py.
 
 import numpy as np
 
+from beaver_ftc.aircraft import PITCH, ROLL
 from beaver_ftc.compiled import kernel
 from beaver_ftc.control.profile import ALTITUDE, SPEED, clamp
 from beaver_ftc.control.slipstream_limit import ceiling
 from beaver_ftc.control.thrust import gained, look_up, power_for, thrust_per_inhg
 from beaver_ftc.design.table import ALPHA
-from beaver_ftc.diagnosis.state import PITCH, ROLL
 
 MOST_PATH_RAD = 0.15  # steepest climb or descent to demand
 MOST_MISSING = 0.1  # largest M of the path angle, rad, and, times gravity, of the acceleration

@@ -17,6 +17,9 @@ if TYPE_CHECKING:  # for annotations
 
 if TYPE_CHECKING:  # what the folder publishes: public.py
     from beaver_ftc.diagnosis.bounds import ROUNDING_RAD_S2
+    from beaver_ftc.diagnosis.conclusion import UNANTICIPATED
+    from beaver_ftc.diagnosis.config import scheme_number
+    from beaver_ftc.diagnosis.detection.blocks import LOSS
     from beaver_ftc.diagnosis.isolation import estimator_names
     from beaver_ftc.diagnosis.readout import (
         RECORDED_BLOCK_FIELDS,
@@ -27,7 +30,6 @@ if TYPE_CHECKING:  # what the folder publishes: public.py
         StatisticalBlock,
         StatisticalHypothesis,
     )
-    from beaver_ftc.diagnosis.state import LOSS, UNANTICIPATED, scheme_number
     from beaver_ftc.diagnosis.types.registry import DESCRIPTIONS_IN_TYPE_ORDER, TYPE_NAMES
     from beaver_ftc.diagnosis.types.registry import TYPES as TYPE_ROWS
 else:

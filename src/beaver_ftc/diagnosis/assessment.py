@@ -12,11 +12,12 @@ It is the output of the diagnosis (`out`), and only this file writes it.
 
 import numpy as np
 
+from beaver_ftc.aircraft import PITCH
 from beaver_ftc.compiled import kernel, record, sized
-from beaver_ftc.diagnosis.conclusion import isolated_surface
+from beaver_ftc.diagnosis.conclusion import NOT_ISOLATED, isolated_surface
+from beaver_ftc.diagnosis.config import WORST_CASE_DETECTOR
 from beaver_ftc.diagnosis.detection import statistical
 from beaver_ftc.diagnosis.detection.fdae import fdae_unmodelled
-from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, WORST_CASE_DETECTOR
 from beaver_ftc.diagnosis.types import (
     GIVE_UP,
     SCALE_COMMAND,

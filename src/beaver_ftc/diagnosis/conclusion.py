@@ -17,8 +17,8 @@ one; s: surface; t: time, s.
 import numpy as np
 
 from beaver_ftc.compiled import copy, fill, kernel, record, sized
-from beaver_ftc.diagnosis.state import NOT_ISOLATED
 
+NOT_ISOLATED, UNANTICIPATED = -1, -2  # in place of an estimator: no fault isolated; one outside the class
 MAX_WITHDRAWN = 16
 
 # Why an isolation is withdrawn: an estimator refutes the surface; all types on it, or all of the named type,
@@ -28,6 +28,14 @@ SURFACE_REFUTED, TYPES_REFUTED, SENSOR_BROKEN, PLUGIN_DECIDES, SEVERAL_POSSIBLE 
 
 # An isolation that was withdrawn, or the type of one: surface; type, -1 if open; its beginning and end, s.
 WITHDRAWN_RECORD = record(surface=int, fault_type=int, from_s=float, to_s=float, reason=int)
+
+
+@sized
+def plugin_verdict_dtype(n: int) -> np.dtype:
+    """A plug-in's verdict. isolated: a surface, NOT_ISOLATED or UNANTICIPATED; axis: on which it has an
+    alarm; theta: its estimate of the fault parameter; effectiveness (n,): of each surface, of use only if
+    has_effectiveness."""
+    return record(detected=int, axis=int, isolated=int, theta=float, has_effectiveness=int, effectiveness=n)
 
 
 @sized

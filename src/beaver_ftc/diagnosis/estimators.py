@@ -37,8 +37,12 @@ from beaver_ftc.compiled import copy, kernel, record
 from beaver_ftc.diagnosis.detection.filters import advance_bound
 from beaver_ftc.diagnosis.detection.intervals import published_interval, residual_interval
 from beaver_ftc.diagnosis.sets import explain, intersect
-from beaver_ftc.diagnosis.state import INTERVAL_THRESHOLD, PUBLISHED_THRESHOLD
 from beaver_ftc.scenario.diagnosis import MAX_POLES
+
+# Of an estimator's `weak` (isolation.py): 0 not weakly excluded; 1 weakly excluded; this value the same,
+# because declared damage may have excluded the other estimators.
+DAMAGE_EXCLUDES = 2
+INTERVAL_THRESHOLD, PUBLISHED_THRESHOLD, CONSTANT_THRESHOLD = 0, 1, 2  # kinds of threshold: isolation.py
 
 # Acceleration by a fault, rad/s2: h + theta Z, within +/- r.
 EFFECT_RECORD = record(h=3, Z=3, r=3)

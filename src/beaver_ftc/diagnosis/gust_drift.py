@@ -17,8 +17,8 @@ from math import pi
 
 import numpy as np
 
+from beaver_ftc.aircraft import PITCH, ROLL, YAW
 from beaver_ftc.compiled import kernel
-from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
 
 
 @kernel

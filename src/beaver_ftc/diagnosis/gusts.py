@@ -50,6 +50,7 @@ from math import pi
 
 import numpy as np
 
+from beaver_ftc.aircraft import PITCH, ROLL, YAW
 from beaver_ftc.aircraft.schema import MAX_MONOMIALS
 from beaver_ftc.compiled import kernel, record
 from beaver_ftc.design.model import rate_damping
@@ -62,7 +63,6 @@ from beaver_ftc.diagnosis.gust_drift import (
     gust_lag,
     project_gust,
 )
-from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
 from beaver_ftc.plant.instruments import wrapped
 
 # Share of the intensity of the rolling, pitching and yawing gust that remains unmeasured with vanes. With

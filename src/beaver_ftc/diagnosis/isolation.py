@@ -42,23 +42,23 @@ from math import exp
 
 import numpy as np
 
-from beaver_ftc.aircraft import Aircraft
+from beaver_ftc.aircraft import PITCH, Aircraft
 from beaver_ftc.compiled import fill, kernel, record, sized
+from beaver_ftc.diagnosis.conclusion import NOT_ISOLATED, UNANTICIPATED
 from beaver_ftc.diagnosis.detection import parity, statistical
+from beaver_ftc.diagnosis.detection.blocks import LOSS, POSITION_HYPOTHESIS
 from beaver_ftc.diagnosis.detection.intervals import advance_reach, is_reachable
 from beaver_ftc.diagnosis.error_map import level_of_share, share_used
-from beaver_ftc.diagnosis.estimators import ESTIMATOR_RECORD, narrow_sets, theta_explains, update_residual
-from beaver_ftc.diagnosis.sets import explain
-from beaver_ftc.diagnosis.state import (
+from beaver_ftc.diagnosis.estimators import (
     DAMAGE_EXCLUDES,
+    ESTIMATOR_RECORD,
     INTERVAL_THRESHOLD,
-    LOSS,
-    NOT_ISOLATED,
-    PITCH,
-    POSITION_HYPOTHESIS,
     PUBLISHED_THRESHOLD,
-    UNANTICIPATED,
+    narrow_sets,
+    theta_explains,
+    update_residual,
 )
+from beaver_ftc.diagnosis.sets import explain
 from beaver_ftc.scenario.declared import Declared
 
 # Rounds of `widen_error`. Each one multiplies the distance of u from its limit by eG / |Z|, the relative

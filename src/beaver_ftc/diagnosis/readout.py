@@ -11,8 +11,8 @@ from typing import Any, NamedTuple, TypeVar, get_type_hints
 
 import numpy as np
 
+from beaver_ftc.diagnosis.config import scheme_number
 from beaver_ftc.diagnosis.detection.blocks import N_SLOTS
-from beaver_ftc.diagnosis.state import scheme_number
 
 Read = TypeVar("Read")
 
@@ -226,7 +226,7 @@ class Readout:
 class DiagnosisReadout(Readout):
     """The diagnosis at one frame; the classes above document the values.
 
-    enabled, scheme_number       whether the diagnosis runs; number of its scheme (`state.scheme_number`)
+    enabled, scheme_number       whether the diagnosis runs; number of its scheme (`config.scheme_number`)
     diagnoses_all_types          whether it examines faults of every type
     detected, detected_at_s      whether the alarm of the surfaces stands; when it was raised, s
     isolated_estimator           number of the estimator whose fault is isolated, NOT_ISOLATED or

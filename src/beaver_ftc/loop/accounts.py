@@ -8,10 +8,10 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.control.accommodation import MAX_EVENTS
+from beaver_ftc.diagnosis.config import PLUGIN_SCHEME
 from beaver_ftc.diagnosis.detection.filters import filter_share
 from beaver_ftc.diagnosis.monitors import sensor_monitor
 from beaver_ftc.diagnosis.schemes import detection_share
-from beaver_ftc.diagnosis.state import PLUGIN_SCHEME
 from beaver_ftc.loop.guarantee import GUARANTEE
 from beaver_ftc.loop.inconclusive import INCONCLUSIVE, note_inconclusive
 from beaver_ftc.plant import channels as ch

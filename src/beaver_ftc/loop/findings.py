@@ -8,8 +8,8 @@ import numpy as np
 
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.diagnosis import Verdict
+from beaver_ftc.diagnosis.conclusion import NOT_ISOLATED, UNANTICIPATED
 from beaver_ftc.diagnosis.monitors.records import sensor_monitor_finding
-from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
 from beaver_ftc.diagnosis.types.findings import NO_FINDINGS, estimate_fault_parameter, fault_finding_dict
 from beaver_ftc.loop.frame import isolated_theta
 

@@ -14,6 +14,7 @@ in effect from the next on.
 
 import numpy as np
 
+from beaver_ftc.aircraft import PITCH
 from beaver_ftc.compiled import apart, kernel, record, sized
 from beaver_ftc.control import accommodation, allocation, power, state
 from beaver_ftc.control.autopilot import steer
@@ -31,7 +32,6 @@ from beaver_ftc.diagnosis.model_prediction import (
 )
 from beaver_ftc.diagnosis.monitors import engine_monitor, sensor_monitor
 from beaver_ftc.diagnosis.schemes.isolated_surfaces import record_isolated_surfaces
-from beaver_ftc.diagnosis.state import PITCH
 from beaver_ftc.diagnosis.types import modes
 from beaver_ftc.loop.accounts import account
 from beaver_ftc.loop.guarantee import add_effect, effect_of_faults, follow_guarantee

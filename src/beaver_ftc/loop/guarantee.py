@@ -9,9 +9,10 @@ the first of their instants. phi is the truth's, so this is an analyst's figure:
 
 import numpy as np
 
+from beaver_ftc.aircraft import PITCH
 from beaver_ftc.compiled import kernel, record
 from beaver_ftc.design.model import unanticipated_pitch
-from beaver_ftc.diagnosis.state import PITCH, STATISTICAL_DETECTOR
+from beaver_ftc.diagnosis.config import STATISTICAL_DETECTOR
 from beaver_ftc.plant.sensing import effective
 from beaver_ftc.scenario.diagnosis import MAX_POLES
 from beaver_ftc.scenario.faults import of_a_sensor

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.aircraft import AXES
+from beaver_ftc.aircraft import AXES, PITCH, ROLL, YAW
 from beaver_ftc.control.envelope_protection import BANK_LIMIT, FASTEST, SLOWEST
 from beaver_ftc.control.profile import AT_ONE_INSTANT, CHANNELS, LIMITED, NOT_JUDGED, SPEED
 from beaver_ftc.diagnosis import Verdict
@@ -18,7 +18,6 @@ from beaver_ftc.diagnosis.conclusion import (
     SURFACE_REFUTED,
     TYPES_REFUTED,
 )
-from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
 from beaver_ftc.diagnosis.types.registry import TYPE_NAMES
 from beaver_ftc.loop.findings import found_so_far, instant
 from beaver_ftc.loop.guarantee import guaranteed_delay_s

@@ -16,10 +16,7 @@ import numpy as np
 from beaver_ftc.compiled import direct
 from beaver_ftc.control import Law, Reference
 from beaver_ftc.diagnosis import Detector, Measured, Verdict
-from beaver_ftc.diagnosis.state import (
-    NOT_ISOLATED,
-    UNANTICIPATED,
-)
+from beaver_ftc.diagnosis.conclusion import NOT_ISOLATED, UNANTICIPATED
 from beaver_ftc.documents.errors import NO_FAILURE, SimulationFailed
 from beaver_ftc.loop import stepping as stages
 from beaver_ftc.loop.assembly import Trim

@@ -4,7 +4,7 @@ import numpy as np
 
 from beaver_ftc.control import Law, has_kernels, row_of
 from beaver_ftc.diagnosis import Detector
-from beaver_ftc.diagnosis.state import PLUGIN_SCHEME, WORST_CASE_DETECTOR
+from beaver_ftc.diagnosis.config import PLUGIN_SCHEME, WORST_CASE_DETECTOR
 from beaver_ftc.loop.assembly import Trim
 from beaver_ftc.loop.plugin_context import context_of
 from beaver_ftc.loop.plugin_frame import PluginFrame

@@ -14,7 +14,7 @@ from math import exp, inf
 
 import numpy as np
 
-from beaver_ftc.aircraft import AXES
+from beaver_ftc.aircraft import AXES, PITCH, ROLL, YAW
 from beaver_ftc.control import flown_by
 from beaver_ftc.control.laws.gain_schedule import STAND_IN
 from beaver_ftc.control.laws.loop_design import margins
@@ -22,7 +22,6 @@ from beaver_ftc.control.readout import DefaultLaw
 from beaver_ftc.design.engine import DPT_0
 from beaver_ftc.design.plain_model import jacobian
 from beaver_ftc.design.table import AIRSPEED, DPT, QDYN
-from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.documents.files import Document
 from beaver_ftc.loop.loop import Loop

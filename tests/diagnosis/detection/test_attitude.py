@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 
 import beaver_ftc as bf
 from beaver_ftc.diagnosis.detection.attitude import attitude_dtype, compare_attitude, configure_attitude
-from beaver_ftc.diagnosis.detection.blocks import N_FILTER_BLOCKS, BlockCapacity, block_dtype
-from beaver_ftc.diagnosis.state import LOSS
+from beaver_ftc.diagnosis.detection.blocks import LOSS, N_FILTER_BLOCKS, BlockCapacity, block_dtype
 from beaver_ftc.scenario.declared import SensorErrors
 from beaver_ftc.scenario.schema import Scenario
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from beaver_ftc.diagnosis.detection.blocks import SIDE_FORCE
 from beaver_ftc.diagnosis.detection.rows import INERTIAL, RAW
-from beaver_ftc.diagnosis.state import SIDE_FORCE
 from beaver_ftc.loop.loop import Loop, fly
 from beaver_ftc.studies.matrix.fault_matrix import declared_errors
 from flying import SINES, scenario

@@ -9,10 +9,10 @@ from beaver_ftc.aircraft.aircraft import FORCES
 from beaver_ftc.aircraft.schema import SIDESLIP_RATE
 from beaver_ftc.design.table import fill_table
 from beaver_ftc.diagnosis.detection import flow_angles
+from beaver_ftc.diagnosis.detection.blocks import SIDE_FORCE
 from beaver_ftc.diagnosis.detection.forces import NORMAL_INDEX, SIDE_INDEX, update_forces
 from beaver_ftc.diagnosis.detection.forces_design import configure_forces
 from beaver_ftc.diagnosis.detection.rows import INERTIAL, RAW
-from beaver_ftc.diagnosis.state import SIDE_FORCE
 from beaver_ftc.plant.instruments import MEASURED
 from beaver_ftc.scenario.diagnosis import Bounds
 from flying import declared_in

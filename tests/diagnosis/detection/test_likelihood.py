@@ -6,8 +6,7 @@ from hypothesis import strategies as st
 from innovations import block_of, bounded_all, by_onset, with_hypotheses
 
 from beaver_ftc.diagnosis.detection import likelihood, whitening
-from beaver_ftc.diagnosis.detection.blocks import N_SLOTS, STEP_FAULT, restarting_slot
-from beaver_ftc.diagnosis.state import LOSS
+from beaver_ftc.diagnosis.detection.blocks import LOSS, N_SLOTS, STEP_FAULT, restarting_slot
 from samples import samples
 
 DT = 0.01

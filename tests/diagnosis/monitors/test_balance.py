@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from kernels import fill, new_fdi
 
+from beaver_ftc.aircraft import YAW
+from beaver_ftc.diagnosis.conclusion import NOT_ISOLATED, UNANTICIPATED
 from beaver_ftc.diagnosis.monitors import engine_monitor
 from beaver_ftc.diagnosis.schemes import adaptive_estimators
-from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED, YAW
 
 ENGINES = {"one": (0.2, -5.0), "two": (0.5, 1.5), "three": (0.3, 4.0)}  # share of the thrust; right_m
 

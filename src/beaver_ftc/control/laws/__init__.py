@@ -15,13 +15,13 @@ at fault:
     lost        of pitch: no surface can give it (`pitch_is_lost`); of authority: a surface is slow or parked
 """
 
+from beaver_ftc.aircraft import PITCH
 from beaver_ftc.compiled import apart
 from beaver_ftc.control import accommodation, allocation, authority, engines, power
 from beaver_ftc.control.accommodation import MODE_REALLOCATED
 from beaver_ftc.control.general_allocation import allocate_generally
 from beaver_ftc.control.probe import advance_probe
 from beaver_ftc.design.table import AIRSPEED
-from beaver_ftc.diagnosis.state import PITCH
 
 WITH_OBSERVER, WITHOUT_OBSERVER = True, False  # `by_observer` of command_surfaces
 

@@ -13,7 +13,7 @@ from math import exp, sqrt
 
 import numpy as np
 
-from beaver_ftc.aircraft import AXES
+from beaver_ftc.aircraft import AXES, PITCH
 from beaver_ftc.compiled import fill, kernel
 from beaver_ftc.control.laws.evidence import derive_fading
 from beaver_ftc.control.laws.loop_design import Loop, corrections, fastest, lead_of
@@ -21,7 +21,6 @@ from beaver_ftc.control.thrust import between
 from beaver_ftc.design.plain_model import effectiveness, own_damping
 from beaver_ftc.design.table import AIRSPEED, QDYN
 from beaver_ftc.diagnosis.model_prediction import DEFAULT_RATE_RAD_S, servo_data
-from beaver_ftc.diagnosis.state import PITCH
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.sensors import RateGyro
 

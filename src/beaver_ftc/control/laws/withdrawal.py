@@ -9,9 +9,9 @@ commanded to its trim (`withdraw`). If another surface takes its place, it is tr
     s           surface
 """
 
+from beaver_ftc.aircraft import PITCH
 from beaver_ftc.compiled import kernel
 from beaver_ftc.control.laws.evidence import is_effective
-from beaver_ftc.diagnosis.state import PITCH
 
 # A doubtful surface is withdrawn after this time at its stop: PATIENCE_S if another surface takes its place.
 PATIENCE_S, LONG_PATIENCE_S = 0.5, 1.0

@@ -54,6 +54,7 @@ from beaver_ftc.compiled import copy, fill, kernel, record, sized
 from beaver_ftc.diagnosis.detection.blocks import (
     DRIFT_PRIOR_RAD_S2,
     LATERAL_BLOCK,
+    LOSS,
     PITCH_BLOCK,
     BlockCapacity,
 )
@@ -66,7 +67,6 @@ from beaver_ftc.diagnosis.detection.gyro_turn import (
     find_gyro,
     sum_turns,
 )
-from beaver_ftc.diagnosis.state import LOSS
 from beaver_ftc.scenario.declared import SensorErrors
 
 LOSS_MEMORY_S = 30.0  # time constant of the correlations with a loss

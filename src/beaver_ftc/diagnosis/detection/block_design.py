@@ -10,13 +10,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from beaver_ftc.aircraft import AXES, Aircraft
+from beaver_ftc.aircraft import AXES, PITCH, ROLL, YAW, Aircraft
 from beaver_ftc.compiled import fill
 from beaver_ftc.diagnosis.detection.blocks import (
     ALPHA_CUBED_MOMENT,
     DRIFT_PRIOR_RAD_S2,
     GROUP_SIZE,
     GROWING_LOSS,
+    LOSS,
     LOSS_END,
     N_GROUP_TESTS,
     N_ROWS,
@@ -25,7 +26,6 @@ from beaver_ftc.diagnosis.detection.blocks import (
     STEP_FAULT,
 )
 from beaver_ftc.diagnosis.detection.rows import RATES, set_columns
-from beaver_ftc.diagnosis.state import LOSS, PITCH, ROLL, YAW
 from beaver_ftc.diagnosis.tolerances import moment_axis
 from beaver_ftc.scenario.declared import Declared
 

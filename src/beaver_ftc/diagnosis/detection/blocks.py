@@ -15,7 +15,6 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel, plain, record, sized
 from beaver_ftc.diagnosis.detection.whitening import FILTER_FIELDS
-from beaver_ftc.diagnosis.state import LOSS
 
 # The blocks of the rates. Each is a set of axes with correlated noise: pitch, roll with yaw, and roll with
 # yaw again, with a drift that returns to zero.
@@ -23,10 +22,12 @@ PITCH_BLOCK, LATERAL_BLOCK, REVERTING_BLOCK = range(3)
 N_FILTER_BLOCKS = 3
 N_SLOTS = 10  # number of onsets that are tested of each hypothesis
 N_ROWS = 5  # roll, pitch, yaw, side force, normal force: rows.py
+SIDE_FORCE, NORMAL_FORCE = 3, 4
 USUAL_HYPOTHESES = 8  # number that is enough for a block of the rates of most aircraft
 MIN_ETA_RAD_S2 = 1e-3  # lower limit of the bound that sets the drift: the bound may pass zero
-# Kinds of hypothesis, in addition to LOSS and POSITION_HYPOTHESIS of state.py, 0 and 1
-STEP_FAULT, ALPHA_CUBED_MOMENT, GROWING_LOSS, LOSS_END = 2, 3, 4, 5
+# Kinds of hypothesis. LOSS: a surface has lost effectiveness; POSITION_HYPOTHESIS, of isolation.py alone: it
+# is anywhere in its travel.
+LOSS, POSITION_HYPOTHESIS, STEP_FAULT, ALPHA_CUBED_MOMENT, GROWING_LOSS, LOSS_END = range(6)
 # Sign of N that supports a hypothesis: a loss removes moment, its end restores moment; 0: both signs.
 SIGN_OF_KIND = {LOSS: -1.0, STEP_FAULT: 0.0, ALPHA_CUBED_MOMENT: 0.0, GROWING_LOSS: -1.0, LOSS_END: 1.0}
 

@@ -35,7 +35,7 @@ import numpy as np
 
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.compiled import kernel, record
-from beaver_ftc.diagnosis.state import STATISTICAL_DETECTOR, WORST_CASE_DETECTOR
+from beaver_ftc.diagnosis.config import STATISTICAL_DETECTOR, WORST_CASE_DETECTOR
 from beaver_ftc.scenario.declared import Declared, SensorErrors
 from beaver_ftc.scenario.diagnosis import MAX_POLES, FdiConfig
 from beaver_ftc.scenario.sensors import NOISE_LIMIT_SIGMA

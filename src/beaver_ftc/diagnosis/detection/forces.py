@@ -32,16 +32,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from beaver_ftc.aircraft import Aircraft, Term
+from beaver_ftc.aircraft import PITCH, YAW, Aircraft, Term
 from beaver_ftc.aircraft.aircraft import FORCES
 from beaver_ftc.aircraft.schema import MAX_SURFACES
 from beaver_ftc.compiled import kernel, record
 from beaver_ftc.design.table import AIRSPEED, N_Y, QDYN, evaluate
+from beaver_ftc.diagnosis.detection.blocks import SIDE_FORCE
 from beaver_ftc.diagnosis.detection.directions import project
 from beaver_ftc.diagnosis.detection.flow_angles import fill_angle_rates, update_inertial
 from beaver_ftc.diagnosis.detection.rows import INERTIAL, N_SOURCES
 from beaver_ftc.diagnosis.gusts import drop_accelerometers
-from beaver_ftc.diagnosis.state import PITCH, SIDE_FORCE, YAW
 from beaver_ftc.scenario.sensors import ACCELEROMETERS
 
 

@@ -5,16 +5,16 @@ Letters as in forces.py; x, y, u of a `TrimState`: rates, readings and deflectio
 
 import numpy as np
 
-from beaver_ftc.aircraft import AXES
+from beaver_ftc.aircraft import AXES, ROLL
 from beaver_ftc.aircraft.aircraft import EARTH_RATE_RAD_S
 from beaver_ftc.aircraft.schema import MAX_SURFACES, SIDESLIP_RATE
 from beaver_ftc.compiled import fill
 from beaver_ftc.design.engine import slipstream_slopes
 from beaver_ftc.design.table import AIRSPEED, DPT, QDYN
+from beaver_ftc.diagnosis.detection.blocks import SIDE_FORCE
 from beaver_ftc.diagnosis.detection.flow_angles import VANES
 from beaver_ftc.diagnosis.detection.forces import MEASURED_FORCES, NORMAL_INDEX, SIDE_INDEX, terms_of_force
 from beaver_ftc.diagnosis.monitors.residual_bounds import EARTH_M_S2
-from beaver_ftc.diagnosis.state import ROLL, SIDE_FORCE
 from beaver_ftc.plant.instruments import NOISE_LIMIT_SIGMA
 from beaver_ftc.scenario.declared import MASS_TOLERANCE, Declared, SensorErrors
 

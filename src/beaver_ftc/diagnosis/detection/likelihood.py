@@ -63,13 +63,13 @@ from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis.detection.blocks import (
     GROUP_SIZE,
     GROWING_LOSS,
+    LOSS,
     LOSS_END,
     N_SLOTS,
     n_test_groups,
     tests_in_group,
 )
 from beaver_ftc.diagnosis.detection.whitening import D0, advance_covariance, update_calm_part, whiten_step
-from beaver_ftc.diagnosis.state import LOSS
 
 LOSS_PRIOR = 12.0  # one over the variance of a loss that is uniform on [0, 1]
 # The magnitudes of a second-order transient of damping 0.7 sum to 1.09 times its sum; on two axes to more.

@@ -60,12 +60,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from beaver_ftc.aircraft import ROLL
 from beaver_ftc.aircraft.schema import MAX_SURFACES
 from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.design.table import AIRSPEED
 from beaver_ftc.diagnosis.detection import likelihood
 from beaver_ftc.diagnosis.detection.blocks import (
     MIN_ETA_RAD_S2,
+    SIDE_FORCE,
     USUAL_HYPOTHESES,
     BlockCapacity,
     block_dtype,
@@ -84,7 +86,6 @@ from beaver_ftc.diagnosis.detection.rows import (
 from beaver_ftc.diagnosis.detection.tones import tones_dtype, update_tones, within_limits
 from beaver_ftc.diagnosis.detection.whitening import add_turn_to_drift
 from beaver_ftc.diagnosis.gust_drift import project_gust, view_drift
-from beaver_ftc.diagnosis.state import ROLL, SIDE_FORCE
 
 PEAK_MEMORY_RATIO = 5.0  # time constant of `peak` over the one with which evidence is forgotten
 MIN_FORCE_PART = 0.9  # component of a direction of length 1, above which a view counts as one of the force

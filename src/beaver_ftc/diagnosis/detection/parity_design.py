@@ -8,14 +8,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from beaver_ftc.aircraft import Aircraft
+from beaver_ftc.aircraft import PITCH, ROLL, YAW, Aircraft
 from beaver_ftc.aircraft.schema import MAX_TERMS_OF_ONE
 from beaver_ftc.compiled import fill
 from beaver_ftc.diagnosis.detection.block_design import ROLL_YAW_PLANE, Entry, configure_block
 from beaver_ftc.diagnosis.detection.blocks import (
     LATERAL_BLOCK,
+    LOSS,
     N_ROWS,
+    NORMAL_FORCE,
     PITCH_BLOCK,
+    SIDE_FORCE,
     STEP_FAULT,
     BlockCapacity,
 )
@@ -35,7 +38,6 @@ from beaver_ftc.diagnosis.detection.rows import (
     VANELESS,
     set_columns,
 )
-from beaver_ftc.diagnosis.state import LOSS, NORMAL_FORCE, PITCH, ROLL, SIDE_FORCE, YAW
 from beaver_ftc.diagnosis.tolerances import moment_axis
 
 PITCH_PLANE = (PITCH, NORMAL_FORCE)

@@ -33,11 +33,11 @@ in this order:
 
 import numpy as np
 
+from beaver_ftc.aircraft import PITCH
 from beaver_ftc.aircraft.schema import MAX_SURFACES, MAX_TERMS, MAX_TERMS_OF_ONE
 from beaver_ftc.compiled import kernel, record
 from beaver_ftc.diagnosis.detection.blocks import ALPHA_CUBED_MOMENT, N_ROWS
 from beaver_ftc.diagnosis.detection.directions import project, project_size
-from beaver_ftc.diagnosis.state import PITCH
 
 # Sources, that is, what is subtracted from the innovation of the rates:
 #     RAW         nothing

@@ -9,10 +9,10 @@ input, together of unit length.
 
 import numpy as np
 
+from beaver_ftc.aircraft import PITCH
 from beaver_ftc.compiled import kernel, record
 from beaver_ftc.design.table import ALPHA, BETA
 from beaver_ftc.diagnosis.detection.fdae import fill_gaussians, train
-from beaver_ftc.diagnosis.state import PITCH
 
 # Centres of the network's basis functions on each axis of the aircraft: of alpha (pitch) or beta, rad; of the
 # rate of the axis, rad/s; of the deflection of the surface that leads the axis, as a share of its travel.

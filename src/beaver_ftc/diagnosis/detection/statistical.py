@@ -34,6 +34,7 @@ from beaver_ftc.diagnosis.detection.attitude import attitude_dtype
 from beaver_ftc.diagnosis.detection.blocks import (
     GROWING_LOSS,
     LATERAL_BLOCK,
+    LOSS,
     LOSS_END,
     MIN_ETA_RAD_S2,
     N_FILTER_BLOCKS,
@@ -51,6 +52,7 @@ from beaver_ftc.diagnosis.detection.rates import NOISE_RECORD, add_constants, be
 from beaver_ftc.diagnosis.detection.rows import ROWS_RECORD, project_rows
 from beaver_ftc.diagnosis.detection.tones import TONE_RECORD
 from beaver_ftc.diagnosis.detection.whitening import D0, add_turn_to_drift, whiten_calm, whiten_step
+from beaver_ftc.diagnosis.estimators import DAMAGE_EXCLUDES
 from beaver_ftc.diagnosis.gust_drift import unmeasured_drift
 from beaver_ftc.diagnosis.gusts import (
     GUST_RECORD,
@@ -58,7 +60,6 @@ from beaver_ftc.diagnosis.gusts import (
     fill_gust_effect,
     update_gust,
 )
-from beaver_ftc.diagnosis.state import DAMAGE_EXCLUDES, LOSS
 
 # A loss that grows at any rate has, as a loss of constant theta, at least this share of its log-likelihood
 # ratio (docs/explanation/statistical.md).

@@ -16,7 +16,7 @@ from beaver_ftc.design.plain_model import jacobian
 from beaver_ftc.design.table import AIRSPEED
 from beaver_ftc.diagnosis.detection.attitude import configure_attitude
 from beaver_ftc.diagnosis.detection.block_design import configure_blocks, hypotheses_by_block
-from beaver_ftc.diagnosis.detection.blocks import N_SLOTS, SIGN_OF_KIND, STEP_FAULT
+from beaver_ftc.diagnosis.detection.blocks import LOSS, N_SLOTS, SIGN_OF_KIND, STEP_FAULT
 from beaver_ftc.diagnosis.detection.drift_design import configure_lengths, configure_noise, eta_rate
 from beaver_ftc.diagnosis.detection.forces_design import TrimState, configure_forces
 from beaver_ftc.diagnosis.detection.parity_design import (
@@ -29,7 +29,6 @@ from beaver_ftc.diagnosis.detection.rows import INERTIAL, VANED
 from beaver_ftc.diagnosis.detection.tones import N_TONES, configure_tones
 from beaver_ftc.diagnosis.gusts import MIN_UNMEASURED_SHARES
 from beaver_ftc.diagnosis.gusts_design import add_gust_noise, configure_gust, configure_gust_speed
-from beaver_ftc.diagnosis.state import LOSS
 from beaver_ftc.diagnosis.tolerances import coefficient_bounds
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.diagnosis import Statistical

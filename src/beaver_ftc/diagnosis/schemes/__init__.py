@@ -14,23 +14,25 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.compiled import apart, fill, kernel, record, sized
-from beaver_ftc.diagnosis import bounds_design, conclusion, isolation, state
+from beaver_ftc.diagnosis import bounds_design, conclusion, isolation, layout
 from beaver_ftc.diagnosis.assessment import weighs_statistics
 from beaver_ftc.diagnosis.bounds import bound_dtype
+from beaver_ftc.diagnosis.config import (
+    ADAPTIVE_SCHEME,
+    NO_SCHEME,
+    PLUGIN_SCHEME,
+    PUBLISHED_SCHEME,
+    SHARED_CONFIG_RECORD,
+    STATISTICAL_DETECTOR,
+    WORST_CASE_DETECTOR,
+    configure_shared,
+)
 from beaver_ftc.diagnosis.detection import directions, fdae, filters, statistical
 from beaver_ftc.diagnosis.detection.filters import bank_share
 from beaver_ftc.diagnosis.detection.parity import USUAL_SIZE, StatisticalSize
 from beaver_ftc.diagnosis.monitors import engine_monitor
 from beaver_ftc.diagnosis.monitors.records import SENSOR_MONITOR_RECORD
 from beaver_ftc.diagnosis.schemes import adaptive_estimators, statistical_frame, zhang2005
-from beaver_ftc.diagnosis.state import (
-    ADAPTIVE_SCHEME,
-    NO_SCHEME,
-    PLUGIN_SCHEME,
-    PUBLISHED_SCHEME,
-    STATISTICAL_DETECTOR,
-    WORST_CASE_DETECTOR,
-)
 from beaver_ftc.diagnosis.types import records
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.scenario.declared import Declared
@@ -42,12 +44,12 @@ def fdi_dtype(n: int, size: StatisticalSize = USUAL_SIZE) -> np.dtype:
     """The stages of the diagnosis of an aircraft with n surfaces; size: capacities of the
     statistical detector's record."""
     return record(
-        config=state.SHARED_CONFIG_RECORD, bound=bound_dtype(n, size.n_map_boxes), bank=filters.BANK_RECORD,
-        fdae=fdae.FDAE_RECORD, verdict=conclusion.conclusion_dtype(n), layout=state.layout_dtype(n),
+        config=SHARED_CONFIG_RECORD, bound=bound_dtype(n, size.n_map_boxes), bank=filters.BANK_RECORD,
+        fdae=fdae.FDAE_RECORD, verdict=conclusion.conclusion_dtype(n), layout=layout.layout_dtype(n),
         isolation=isolation.isolation_dtype(n), types=records.fault_types_dtype(n),
         statistical=statistical.statistical_dtype(size), sensor_monitor=SENSOR_MONITOR_RECORD,
         published=zhang2005.PUBLISHED_RECORD, engine_monitor=engine_monitor.ENGINE_MONITOR_RECORD,
-        plugin_verdict=state.plugin_verdict_dtype(n),
+        plugin_verdict=conclusion.plugin_verdict_dtype(n),
     )  # fmt: skip
 
 
@@ -61,8 +63,8 @@ def configure_diagnosis(fdi: np.void, pred: np.void, declared: Declared, travel:
     aircraft = declared.aircraft
     dt = 1.0 / declared.rate_hz
     rows = isolation.list_estimators(config.fault_class, aircraft)
-    state.configure_shared(fdi["config"], declared)
-    state.configure_layout(fdi["layout"], rows, aircraft)
+    configure_shared(fdi["config"], declared)
+    layout.configure_layout(fdi["layout"], rows, aircraft)
     isolation.configure_isolation(fdi["isolation"], declared, rows, travel)
     if config.pairs and (refusal := pairs_refused(declared.sensors.declared, aircraft)):
         raise BadInput(f"{declared.name}: fdi.pairs: {refusal}, allowed: false")

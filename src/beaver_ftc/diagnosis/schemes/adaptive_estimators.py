@@ -16,13 +16,15 @@ The isolation depends on the fault class, and on the detectors whose exclusions 
     k, t            number of the frame; its time, s
 """
 
+from beaver_ftc.aircraft import YAW
 from beaver_ftc.compiled import apart, kernel
 from beaver_ftc.design.table import ALPHA, BETA
 from beaver_ftc.diagnosis import conclusion, estimators, isolation
+from beaver_ftc.diagnosis.conclusion import UNANTICIPATED
+from beaver_ftc.diagnosis.config import STATISTICAL_DETECTOR, WORST_CASE_DETECTOR
 from beaver_ftc.diagnosis.detection import fdae, filters
 from beaver_ftc.diagnosis.monitors import engine_monitor, sensor_monitor
 from beaver_ftc.diagnosis.schemes.statistical_frame import update_tests
-from beaver_ftc.diagnosis.state import STATISTICAL_DETECTOR, UNANTICIPATED, WORST_CASE_DETECTOR, YAW
 from beaver_ftc.diagnosis.types import examination, frame_blocks, modes, pairs, verdict
 
 

@@ -15,8 +15,8 @@ from beaver_ftc.diagnosis.conclusion import (
     isolated_surface,
     update_interval,
 )
+from beaver_ftc.diagnosis.config import PLUGIN_SCHEME
 from beaver_ftc.diagnosis.monitors import sensor_monitor
-from beaver_ftc.diagnosis.state import PLUGIN_SCHEME
 from beaver_ftc.diagnosis.types.registry import NAMED, SAME_NAME
 from beaver_ftc.diagnosis.types.remaining import TYPE_UNDECIDED, any_remains
 from beaver_ftc.diagnosis.types.verdict import DEDUCED_FAULTY

@@ -35,9 +35,9 @@ from beaver_ftc.diagnosis.detection.state_network import (
     evaluate_state_network,
     train_state_network,
 )
+from beaver_ftc.diagnosis.estimators import CONSTANT_THRESHOLD
 from beaver_ftc.diagnosis.monitors import sensor_monitor
 from beaver_ftc.diagnosis.schemes import adaptive_estimators
-from beaver_ftc.diagnosis.state import CONSTANT_THRESHOLD
 from beaver_ftc.plugins import DETECTORS, settings
 from beaver_ftc.scenario.declared import Declared
 

@@ -7,14 +7,15 @@
     lead        the surface, and its mode, that the supervisor of the law follows (control/accommodation.py)
     silent      a fault with whose deflection error the last frame does not agree
 
-types: of `fault_types_dtype`; layout: of `state.layout_dtype`. Other symbols: remaining.py, verdict.py,
+types: of `fault_types_dtype`; layout: of `layout.layout_dtype`. Other symbols: remaining.py, verdict.py,
 types/__init__.py.
 """
 
 import numpy as np
 
+from beaver_ftc.aircraft import PITCH
 from beaver_ftc.compiled import kernel
-from beaver_ftc.diagnosis.state import PITCH, PITCH_GROUP
+from beaver_ftc.diagnosis.layout import PITCH_GROUP
 from beaver_ftc.diagnosis.types import (
     GIVE_UP,
     SCALE_COMMAND,

@@ -11,8 +11,9 @@ remains on each.
 Other symbols: verdict.py, remaining.py, types/__init__.py.
 """
 
+from beaver_ftc.aircraft import ROLL, YAW
 from beaver_ftc.compiled import kernel
-from beaver_ftc.diagnosis.state import LATERAL_GROUP, ROLL, YAW
+from beaver_ftc.diagnosis.layout import LATERAL_GROUP
 from beaver_ftc.diagnosis.types.observations import observe_error
 from beaver_ftc.diagnosis.types.registry import ALL
 from beaver_ftc.diagnosis.types.remaining import any_remains, explains_flight, type_on_surface

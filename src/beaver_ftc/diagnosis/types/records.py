@@ -12,8 +12,8 @@ from math import ceil, pi, radians
 import numpy as np
 
 from beaver_ftc.compiled import fill, record, sized
+from beaver_ftc.diagnosis.layout import PITCH_GROUP
 from beaver_ftc.diagnosis.model_prediction import DEFAULT_RATE_RAD_S, servo_data
-from beaver_ftc.diagnosis.state import PITCH_GROUP
 from beaver_ftc.diagnosis.types.observations import OBSERVATION_RECORD
 from beaver_ftc.diagnosis.types.registry import N_TYPES, TYPES
 from beaver_ftc.scenario.declared import Declared

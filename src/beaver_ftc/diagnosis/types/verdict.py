@@ -5,15 +5,16 @@ chooses what the law does, and findings.py puts the finding in words.
 
     types       record of `fault_types_dtype`
     past        record of `conclusion_dtype`, of the frame before
-    layout      record of `state.layout_dtype`
+    layout      record of `layout.layout_dtype`
     finding     four values: an estimator, NOT_ISOLATED or UNANTICIPATED; the time of its isolation, s; the
                 kind; the time since which the fault is of this kind, s
 
 Other symbols: remaining.py, types/__init__.py.
 """
 
+from beaver_ftc.aircraft import PITCH
 from beaver_ftc.compiled import kernel
-from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, UNANTICIPATED
+from beaver_ftc.diagnosis.conclusion import NOT_ISOLATED, UNANTICIPATED
 from beaver_ftc.diagnosis.types import SCALE_COMMAND
 from beaver_ftc.diagnosis.types.registry import ALL, FOLLOWS_COMMAND, MODE, N_TYPES, WAIT_HALF_CYCLES
 from beaver_ftc.diagnosis.types.remaining import (

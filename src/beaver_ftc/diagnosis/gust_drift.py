@@ -10,7 +10,16 @@ If the axes of the gusts turn fast, the unmeasured gust changes with them in bod
 drift. The variance of that change is added to the drift in the frames of the turn: `var_turn`, which
 `whitening.add_turn_to_drift` reads.
 
-Letters as in gusts.py, which computes the estimate.
+gusts.py computes the estimate. Letters of the kernels:
+
+    i, k, j    body axes; axis of the gusts, about which they roll, pitch or yaw
+    w, tau     rotation of the air in the gusts' axes, rad/s; its lag, s
+    L          rate damping, angular acceleration per rad/s (3, 3), 1/s; of a view (3,)
+    C          rotation (3, 3) from the gusts' axes to body axes
+    Q          intensity of the drift of w over V, rad2/s3 per m/s
+    Q_V        intensity of the drift of an acceleration over V, (rad/s2)2/s per m/s
+    share      part of Q, or of a variance, that the vanes leave unmeasured
+    b          span, m
 """
 
 from math import pi

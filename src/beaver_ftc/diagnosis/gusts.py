@@ -31,7 +31,7 @@ v <- v + dt (3 a - a_prev) / 2.
 gust_drift.py has the drift by the part of a gust that stays unmeasured. gusts_design.py fills the record from
 what a scenario declares.
 
-Letters of the kernels. i and k are body axes, j an axis of the gusts, about which they roll, pitch or yaw. An
+Letters of the kernels. i is a body axis, j an axis of the gusts, about which they roll, pitch or yaw. An
 index _q or _r at the end of a letter is pitch or yaw. w holds q_g and r_g.
 
     v, v_g         velocity relative to the air; gust (3,) since the start, m/s in level axes
@@ -40,10 +40,10 @@ index _q or _r at the end of a letter is pitch or yaw. w holds q_g and r_g.
     T, C           rotations (3, 3): from level axes to body axes; from the gusts' axes to body axes
     w, tau         rotation of the air in the gusts' axes, rad/s; its lag, s
     acc            effect of w on the rates, rad/s2
-    L              rate damping, angular acceleration per rad/s (3, 3), 1/s; of a view (3,)
+    L              rate damping, angular acceleration per rad/s (3, 3), 1/s
     Q              intensity of the drift of w over V, rad2/s3 per m/s
-    Q_V            intensity of the drift of an acceleration over V, (rad/s2)2/s per m/s
     share          part of Q, or of a variance, that the vanes leave unmeasured
+    b              span, m
 """
 
 from math import pi
@@ -179,8 +179,8 @@ def start_gust(gust, y, attitude):
 @kernel
 def turned(v, z):
     """v (3,) in level axes, turned by an angle about the vertical; z = exp(i angle)."""
-    h = complex(v[0], v[1]) * z
-    return h.real, h.imag, v[2]
+    level = complex(v[0], v[1]) * z
+    return level.real, level.imag, v[2]
 
 
 @kernel
@@ -241,18 +241,18 @@ def advance_gust(gust, y, attitude, dt):
 def update_rotation(gust, dv, psi_dot, dt):
     """Let the pitching and yawing rotation of the air decay, and add what the change of the gust shows of it.
 
-        w_q <- a_q w_q + dv_z / V tau_q      w_r <- a_r w_r + dv_y / V tau_r
-        start_share <- a_q start_share
+        w_q <- decay_q w_q + dv_z / V tau_q      w_r <- decay_r w_r + dv_y / V tau_r
+        start_share <- decay_q start_share
 
-    a_q = exp(-dt / tau_q), a_r = exp(-dt / tau_r); dv (3,) m/s: change of the gust in level axes; psi_dot
-    rad/s: rate of the heading; dt s.
+    decay_q = exp(-dt / tau_q), decay_r = exp(-dt / tau_r); dv (3,) m/s: change of the gust in level axes;
+    psi_dot rad/s: rate of the heading; dt s.
 
     The gusts turn with the aircraft: a gust from ahead, of deviation sigma, becomes one from the side, at the
     rate psi_dot sigma. The gust itself is a walk of intensity 3 sigma^2 V / L. The square of that rate over
     this intensity, times the lag of the yawing gust, 3 b / pi V, is the share of the intensity that is
     unmeasured:
 
-        share = psi_dot^2 b L / (pi V^2)        turn_past <- min(max(a_r turn_past, larger), 1)
+        share = psi_dot^2 b L / (pi V^2)        turn_past <- min(max(decay_r turn_past, larger), 1)
 
     larger: the larger share of this instant and of the one before, because JSBSim's gusts turn a step after
     the heading. If `larger` reaches 1, as when the nose passes the vertical, the vanes mostly measure the
@@ -263,15 +263,15 @@ def update_rotation(gust, dv, psi_dot, dt):
     V = gust.output.V
     tau_q = gust_lag(gust, PITCH, V)
     tau_r = gust_lag(gust, YAW, V)
-    a_q = np.exp(-dt / tau_q)
-    a_r = np.exp(-dt / tau_r)
+    decay_q = np.exp(-dt / tau_q)
+    decay_r = np.exp(-dt / tau_r)
     share = psi_dot * psi_dot * cfg.span * cfg.L_gust / (pi * V * V)
     larger = max(mem.turn_now, share)
     mem.turn_now = share
-    mem.turn_past = min(max(a_r * mem.turn_past, larger), 1.0)
-    mem.start_share *= a_q
-    mem.w[PITCH] = a_q * mem.w[PITCH] + dv[2] / (V * tau_q)
-    mem.w[YAW] *= a_r
+    mem.turn_past = min(max(decay_r * mem.turn_past, larger), 1.0)
+    mem.start_share *= decay_q
+    mem.w[PITCH] = decay_q * mem.w[PITCH] + dv[2] / (V * tau_q)
+    mem.w[YAW] *= decay_r
     if larger < 1.0:
         mem.w[YAW] += dv[1] / (V * tau_r)
     else:
@@ -283,8 +283,8 @@ def update_rotation(gust, dv, psi_dot, dt):
 def update_gust_speed(gust, dv, V, dt):
     """Update v_g and V for the elapsed dt s.
 
-        v_g <- clip(a v_g + dv, -v_max, v_max)      gust.output.V = max(|v + v_g|, V / 2)
-        start_left <- a^2 start_left                a = exp(-a_v dt)
+        v_g <- clip(decay v_g + dv, -v_max, v_max)      gust.output.V = max(|v + v_g|, V / 2)
+        start_left <- decay^2 start_left                decay = exp(-a_v dt)
 
     dv (3,) m/s: change of the gust in level axes. V m/s: airspeed, which is the speed if no gust is measured.
     """
@@ -293,11 +293,11 @@ def update_gust_speed(gust, dv, V, dt):
     gust.output.V = V
     if not gust.output.measured:
         return
-    a = np.exp(-cfg.a_v * dt)
+    decay = np.exp(-cfg.a_v * dt)
     V2 = 0.0
-    mem.start_left *= a * a
+    mem.start_left *= decay * decay
     for i in range(3):
-        mem.v_g[i] = min(max(a * mem.v_g[i] + dv[i], -cfg.v_max), cfg.v_max)
+        mem.v_g[i] = min(max(decay * mem.v_g[i] + dv[i], -cfg.v_max), cfg.v_max)
         V2 += (mem.v[i] + mem.v_g[i]) ** 2
     gust.output.V = max(np.sqrt(V2), 0.5 * V)
 
@@ -316,7 +316,7 @@ def set_intensity(gust, altitude):
 
 @kernel
 def step_gust(gust, y, attitude, dt, k):
-    """Start at frame 0, and update the gust at later frames; arguments as in `advance_gust`."""
+    """Start at frame k = 0, and update the gust at later frames; arguments as in `advance_gust`."""
     if k > 0:
         advance_gust(gust, y, attitude, dt)
     else:

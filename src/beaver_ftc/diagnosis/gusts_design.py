@@ -1,7 +1,9 @@
 """The record of the gust estimate, and its noise, as they follow from what a scenario declares.
 
-Letters as in gusts.py, and: sigma m/s: standard deviation of a gust; in `configure_gust_speed`, b m/s2 is the
-error of the acceleration that predicts the velocity, and a 1/s the decay rate of v_g.
+y, u     readings and deflections in trim
+V        airspeed in trim, m/s
+sigma    standard deviation of a gust, m/s
+v_g      sum of the changes of the gust, m/s (gusts.py)
 """
 
 from math import hypot, pi
@@ -108,16 +110,18 @@ def gust_noise(sigma: np.ndarray, model: np.void, y: np.ndarray, u: np.ndarray, 
 
 
 def configure_gust_speed(gust: np.void, declared: Declared, level: float, V: float) -> None:
-    """If a gust is measured, fill the decay rate a of its velocity, its limit MAX_GUST_STDS sigma, and the
-    error variance of the speed; V m/s: in trim.
+    """If a gust is measured, fill the decay rate a_v of its velocity, its limit MAX_GUST_STDS sigma, and the
+    error variance of the speed:
 
-        a^3 = 2 b^2 V / (L sigma^2)      var_V = sigma^2 a / (a + V / L) + (b / a)^2 + noise^2 + e_V^2
+        a_v^3 = 2 e_a^2 rate / sigma^2
+        var_V = sigma^2 a_v / (a_v + rate) + (e_a / a_v)^2 + noise^2 + e_V^2
 
-    noise, e_V m/s: of the airspeed's reading, and its constant error.
+    noise, e_V m/s: of the airspeed's reading, and its constant error. level: of the alarm, standard
+    deviations.
 
-    level: of the alarm, standard deviations. The sum v_g decays at the rate a, 1/s, so an error b of the
-    acceleration, m/s2, gives it an error b / a. A gust returns to zero at the rate V / L, L m its length, so
-    the decaying sum misses the variance sigma^2 a / (a + V / L). The total of both is least near this a.
+    The sum v_g decays at the rate a_v, 1/s, so an error e_a of the acceleration, m/s2, that predicts the
+    velocity gives it an error e_a / a_v. A gust returns to zero at the rate V over its length, so the
+    decaying sum misses the variance sigma^2 a_v / (a_v + rate). The total of both is least near this a_v.
     """
     sigma = declared.air.sigma_mps
     errors = declared.sensors
@@ -127,17 +131,19 @@ def configure_gust_speed(gust: np.void, declared: Declared, level: float, V: flo
     rate = V / SCALE_M
     airspeed = errors["V"]
     drag = GRAVITY_MPS2 * MAX_DRAG_OVER_WEIGHT
-    b = 2.0 * EARTH_RATE_RAD_S * V + MAX_PATH_SLOPE_RAD * EARTH_M_S2  # Coriolis; change of gravity with place
-    b += GRAVITY_MPS2 * (errors["phi"].steady + errors["theta"].steady)
+    e_a = (
+        2.0 * EARTH_RATE_RAD_S * V + MAX_PATH_SLOPE_RAD * EARTH_M_S2
+    )  # Coriolis; change of gravity with place
+    e_a += GRAVITY_MPS2 * (errors["phi"].steady + errors["theta"].steady)
     if out["uses_accelerometers"]:
-        b += errors["ax"].steady + drag * errors["ax"].slope
+        e_a += errors["ax"].steady + drag * errors["ax"].slope
     else:
-        b += drag * (declared.coefficients.largest + MASS_TOLERANCE)
-    a = (2.0 * b**2 * rate / sigma**2) ** (1.0 / 3.0)
+        e_a += drag * (declared.coefficients.largest + MASS_TOLERANCE)
+    a_v = (2.0 * e_a**2 * rate / sigma**2) ** (1.0 / 3.0)
     e_V = airspeed.steady + airspeed.slope * V
-    var_V = sigma**2 * a / (a + rate) + (b / a) ** 2 + airspeed.random**2 + e_V**2
+    var_V = sigma**2 * a_v / (a_v + rate) + (e_a / a_v) ** 2 + airspeed.random**2 + e_V**2
     fill(
-        gust["config"], var_v=sigma**2, v_max=MAX_GUST_STDS * sigma, a_v=a, var_V=var_V,
+        gust["config"], var_v=sigma**2, v_max=MAX_GUST_STDS * sigma, a_v=a_v, var_V=var_V,
         speed_error_share=speed_error_share(level),
     )  # fmt: skip
 
@@ -145,9 +151,12 @@ def configure_gust_speed(gust: np.void, declared: Declared, level: float, V: flo
 def speed_error_share(level: float) -> float:
     """Share of a gust's intensity that a relative error e of the speed leaves, over the variance of e.
 
-    The error adds (e / tau) q to the gust's equation. At the frequency w its spectrum is e^2 (w / tau)^2 /
-    (w^2 + 1 / tau^2)^2 times that of a random walk of the gust's intensity: e^2 / 4 at most. e is normal and
-    independent of the noise. The product of two normal numbers exceeds x deviations with a probability of
-    exp(-x). This equals that of the alarm level, exp(-level^2 / 2), if e is taken to be level / 2 deviations.
+    The error adds (e / tau) q to the gust's equation. At the frequency omega its spectrum is
+
+        e^2 (omega / tau)^2 / (omega^2 + 1 / tau^2)^2  <=  e^2 / 4
+
+    times that of a random walk of the gust's intensity. e is normal and independent of the noise. The product
+    of two normal numbers exceeds x deviations with a probability of exp(-x). This equals that of the alarm
+    level, exp(-level^2 / 2), if e is taken to be level / 2 deviations.
     """
     return (0.5 * level) ** 2 / 4.0

@@ -79,24 +79,25 @@ def controller(loop: Loop, s: float, z: np.ndarray) -> np.ndarray:
     """Actuator command over measured rate, times -G: the law's own response (n,), 1/s, at z (n,).
 
     The law's equations (rejecting.py), z-transformed, of one axis with f = 0 and xm = 0; positions p and
-    commands c times G, innovation e, L and M for L_rate and L_disturbance, m: mean of p over the frame:
+    commands c times G, observed disturbance d, innovation e, L_r and L_d for L_rate and L_disturbance;
+    mean p: that of p over the frame:
 
-        xhat = xhat/z + dt (d/z + m p) + L e,    d = d/z + M e,    e = x - xhat/z - dt (d/z + m p)
+        xhat = xhat/z + dt (d/z + mean p) + L_r e,    d = d/z + L_d e,    e = x - xhat/z - dt (d/z + mean p)
         p = `actuator_response` c,    c = p + lead (-s x+ - d - p)
-        x+ = xhat + share dt (p + d),    m = share/z + 1 - share
+        x+ = xhat + share dt (p + d),    mean = share/z + 1 - share
 
     A row is an equation; its columns are xhat, d, p and c, and `driven` is what x multiplies.
     """
     dt = loop.dt_s
     share = loop.share
     L_rate, L_disturbance = corrections(s, dt)
-    keep = 1 - L_rate
+    kept = 1 - L_rate
     z_inv = 1.0 / z
     mean = share * z_inv + 1.0 - share
     ones = np.ones_like(z)
     zeros = np.zeros_like(z)
     rows = [
-        [ones - keep * z_inv, -keep * dt * z_inv, -keep * dt * mean, zeros],
+        [ones - kept * z_inv, -kept * dt * z_inv, -kept * dt * mean, zeros],
         [L_disturbance * z_inv, ones - z_inv + L_disturbance * dt * z_inv, L_disturbance * dt * mean, zeros],
         [zeros, zeros, ones, -actuator_response(loop, z)],
         [loop.lead * s * ones, loop.lead * (1 + s * share * dt) * ones,
@@ -166,14 +167,14 @@ def candidates(loop: Loop, gain_db: float, phase_deg: float) -> tuple[np.ndarray
     """LEAST_PER_S and the values of s above it, up to the first one that does not leave the margins, 1/s,
     ascending, and the noise speed of each, 1/s2.
 
-    The fastest has s = 1 / (2 delay); delay: that of a frame's hold, of the command and of the gyro, s.
+    The largest is s_max = 1 / (2 delay); delay: that of a frame's hold, of the command and of the gyro, s.
     """
     omega = frequencies(loop.dt_s)
     z = np.exp(1j * omega * loop.dt_s)
-    fastest = 0.5 / (loop.dt_s * (0.5 + loop.share) + loop.delay_s)
+    s_max = 0.5 / (loop.dt_s * (0.5 + loop.share) + loop.delay_s)
     values: list[float] = []
     speeds: list[float] = []
-    for s in np.geomspace(LEAST_PER_S, max(fastest, 2.0 * LEAST_PER_S), N_CANDIDATES):
+    for s in np.geomspace(LEAST_PER_S, max(s_max, 2.0 * LEAST_PER_S), N_CANDIDATES):
         upper, lower, phase = margins(open_loop(loop, float(s), z))
         if values and not (min(upper, lower) >= gain_db + RESERVE_DB and phase >= phase_deg + RESERVE_DEG):
             break

@@ -5,8 +5,6 @@ regressors, and hypotheses; each hypothesis is tested for N_SLOTS onsets (likeli
 
 Onsets: slot j restarts every 2^(j+1) frames (the last one every 2^j), so that onsets of about every age exist
 at any time. After an alarm no slot restarts, and old evidence decays slowly.
-
-Letters as in likelihood.py.
 """
 
 from typing import NamedTuple
@@ -59,14 +57,16 @@ GROUP_SIZE = 4
 N_GROUP_TESTS = GROUP_SIZE * N_SLOTS
 TESTS_RECORD = record(
     sign=N_GROUP_TESTS,  # of an N that supports the hypothesis, or 0
-    # signature since the onset, rad/s2; state of its filter; its response in this frame, rad/s
-    s=(2, N_GROUP_TESTS), x_s=(4, N_GROUP_TESTS), g_s=(2, N_GROUP_TESTS),
-    w=(2, N_GROUP_TESTS), N=N_GROUP_TESTS, D=N_GROUP_TESTS, e_R=N_GROUP_TESTS,
-    left=N_GROUP_TESTS,  # exp(-kappa t) of a growing loss; for an end of a loss 1, and 0 after the onset
-    e_0=N_GROUP_TESTS, e_tv=N_GROUP_TESTS, e_w=N_GROUP_TESTS,
+    # signature since the onset, rad/s2; state of its filter; its response in this frame, rad/s; and S^-1 g_s
+    s=(2, N_GROUP_TESTS), x_s=(4, N_GROUP_TESTS), g_s=(2, N_GROUP_TESTS), w=(2, N_GROUP_TESTS),
+    N=N_GROUP_TESTS, D=N_GROUP_TESTS,  # sums of w' g and of w' g_s
+    left=N_GROUP_TESTS,  # exp(-kappa age) of a growing loss; for an end of a loss 1, and 0 after the onset
+    # Of |N|: part by errors of coefficients; three parts by a bounded uncertainty (likelihood.py). Of N: part
+    # by calm air, part by a coarse gust
+    e_R=N_GROUP_TESTS, e_0=N_GROUP_TESTS, e_tv=N_GROUP_TESTS, e_w=N_GROUP_TESTS,
     N_p=N_GROUP_TESTS, N_c=N_GROUP_TESTS,
-    score=N_GROUP_TESTS, llr_lo=N_GROUP_TESTS, llr_hi=N_GROUP_TESTS,
-    llr=N_GROUP_TESTS,  # log-likelihood ratio against no fault, -1 without information
+    # score; bounds on the log-likelihood ratio against no fault; that ratio itself, -1 without information
+    score=N_GROUP_TESTS, llr_lo=N_GROUP_TESTS, llr_hi=N_GROUP_TESTS, llr=N_GROUP_TESTS,
 )  # fmt: skip
 
 
@@ -82,19 +82,22 @@ def block_dtype(size: BlockCapacity) -> np.dtype:
         source=int, m=(2, N_ROWS), eta=2, any_position=int,
         # correlation length of the drift, m, 0 for a random walk; factor on the intensity of a gust
         drift_length_m=float, Q_scale=float,
-        x_known=4, nu=2,  # state of the filter after known faults
+        nu=2, x_known=4,  # innovation of the frame, rad/s2; state of the filter after known faults
         # in turbulence: filter without gust; lambda p, rad/s, and the sums pg, pp (`update_calm_part`)
         calm=record(**FILTER_FIELDS), p=2, pg=float, pp=float,
         has_coarse=int, g_c=2, x_c=4,  # whether vanes show a gust coarsely; state of its filter
         # alarm level, standard deviations; share of it reserved for noise beyond a bounded uncertainty
-        alarm_level=float, noise_share=float, eta_rate=float, eta_0=2, eta_r=2,
+        alarm_level=float, noise_share=float,
+        # largest change of the bounded uncertainty in a frame, over eta; effects of eta on g, rad/s, by a
+        # constant and by the transient of a step (`likelihood.bound_responses`)
+        eta_rate=float, eta_0=2, eta_r=2,
         # regressors: number in use; of these the first n_columns are columns of Z in rows.py, one more is the
         # leak of a view; tolerances; values, states and responses
         n_Z=int, n_columns=int, columns=(int, size.max_regressors), tol=size.max_regressors,
         regressor=(size.max_regressors, 2), x_Z=(size.max_regressors, 4), g_Z=(size.max_regressors, 2),
         n_h=int, hypothesis=(HYPOTHESIS_RECORD, size.max_hypotheses),
         tests=(TESTS_RECORD, n_groups),
-        R=(n_groups, size.max_regressors, N_GROUP_TESTS),
+        R=(n_groups, size.max_regressors, N_GROUP_TESTS),  # sums of w' g_Z
     )  # fmt: skip
 
 
@@ -109,7 +112,9 @@ def new_filter_block(P: np.ndarray, R: np.ndarray) -> np.ndarray:
     b = blocks[0]
     x = slice(0, n)
     d = slice(n, 2 * n)
-    b["n"], b["axes"], b["R_y"][:n] = n, (0, 1), R
+    b["n"] = n
+    b["axes"] = 0, 1
+    b["R_y"][:n] = R
     for name, i, j in (("P_xx", x, x), ("P_xd", x, d), ("P_dd", d, d)):
         b[name][:n, :n] = P[i, j]
     return blocks

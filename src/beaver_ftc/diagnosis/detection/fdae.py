@@ -14,8 +14,12 @@ weights:
 state. The leak acts once another estimate explains the fault. D is a continuous dead zone at the detection
 threshold: the network cannot learn what the declared uncertainty explains.
 
-Symbols of the kernels, in addition to those of filters.py: net is a record of FDAE_NETWORK_RECORD; M the
-memory of the FDAE; j a basis function.
+Symbols of the kernels:
+
+    x, F          measured rates (3,) rad/s; mean acceleration of the design model (3,) rad/s2
+    i, j          axis, basis function
+    bank, bound   detection filters (filters.py), record of `bound_dtype`
+    net, M        record of FDAE_NETWORK_RECORD, memory of the FDAE
 """
 
 from math import exp

@@ -1,6 +1,11 @@
 """Flow angles without the vanes: by integrating the inertial motion, and by the forces.
 
-Letters as in forces.py. The angles are beta and alpha, rad, in the order of the forces.
+The angles are beta and alpha, rad, in the order of the forces, side and normal (forces.py):
+
+    i, f        number of the force, and its record
+    e           innovation of a force, rad/s2; e_vane: e per rad of a vane's error, in trim
+    q_ratio     dynamic pressure over that in trim
+    y           readings (4 + signals,)
 """
 
 import numpy as np

@@ -1,6 +1,9 @@
 """The records of the forces, as they follow from what a scenario declares.
 
-Letters as in forces.py; x, y, u of a `TrimState`: rates, readings and deflections in trim.
+x, y, u     of a `TrimState`: rates, readings and deflections in trim
+i, f        number of a force, and its record (forces.py)
+e           innovation of a force, rad/s2; per_C: e of a coefficient of one
+std         standard deviation of the noise of a reading
 """
 
 import numpy as np

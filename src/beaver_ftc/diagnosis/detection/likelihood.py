@@ -15,22 +15,23 @@ Errors of coefficients are constants c_j, |c_j| <= tol_j, times known regressors
 they add sum_j c_j R_j to N, with R_j = sum g_s' S^-1 g_rj. That is at most sum_j tol_j |R_j|, which is
 subtracted from the evidence.
 
-A bounded uncertainty |d| <= eta_bar is not noise. g_d is the response of the filter to it. The response to a
-unit constant settles at g_0; the response to a unit step also has a transient whose sum is 1 / K_d and whose
-magnitudes sum to at most RINGING / K_d (RINGING_FACTOR). With w = S^-1 g_s, summation by parts gives
+A bounded uncertainty |delta| <= eta_bar is not noise. g_delta is the response of the filter to it. The
+response to a unit constant settles at g_inf; the response to a unit step also has a transient whose sum is
+1 / K_d and whose magnitudes sum to at most RINGING / K_d (RINGING_FACTOR). With w = S^-1 g_s, summation by
+parts gives
 
-    |sum w' g_d| <= eta_bar (|g_0| sum |w| + RINGING / K_d TV(w)),     TV(w) = sum |w[k] - w[k-1]|
+    |sum w' g_delta| <= eta_bar (|g_inf| sum |w| + RINGING / K_d TV(w)),     TV(w) = sum |w - w_before|
 
-d changes by at most eta_bar omega dt in a frame, so omega dt sum |w| may replace TV(w). An alarm requires
+delta changes by at most eta_bar omega dt in a frame, so omega dt sum |w| may replace TV(w). An alarm requires
 more evidence than this bound explains.
 
 A growing loss is a loss times 1 - exp(-kappa t). The end of a loss is a step of the opposite sign, of the
 size that the signature had at the onset. These hypotheses raise no alarm; they are needed to decide whether
 a fault of a surface can explain the data.
 
-In air that is calmer than declared, a part lambda p of g is predictable, to which the control law reacts
-(whitening.py). The evidence that this part contributes is subtracted from
-that of hypotheses with a sign, which follow the commands of the law.
+In air that is calmer than declared, a part p of g is predictable, to which the control law reacts
+(whitening.py). The evidence that this part contributes is subtracted from that of hypotheses with a sign,
+which follow the commands of the law.
 
 A gust may be visible to the vanes only roughly, if no force separates it from the aircraft's own motion
 (gusts.py). It correlates with the surfaces of a law that uses the vanes. Its response is whitened likewise,
@@ -38,23 +39,27 @@ and the evidence that it contributes is subtracted likewise.
 
 blocks.py has the records, and the onsets that are tested.
 
-Letters of the kernels, in addition to those of whitening.py. i is an axis, j a regressor, k an onset test,
-h a hypothesis, t a group of onset tests.
+Letters of the kernels. b is a block, i an axis, j a regressor, k an onset test, h a hypothesis, t a group of
+onset tests; a digit at the end of g or S is an axis.
 
+    nu             innovation of the frame, rad/s2
     g              whitened response, rad/s: to nu; g_Z to a regressor, g_c to a coarse gust, g_s to s
-    x              state of a filter, in the same way: x_Z, x_c, x_s
+    x              state of a filter, in the same way: x_Z, x_c, x_s; of two axes first the rates, from D0 on
+                   the drift
+    K_x, K_d, S    gains of the filter on rate and drift, 1/s; covariance of g, rad2/s2 (S_inv: its inverse)
+    a              decay of the drift in a frame
     s, w           signature since the onset, rad/s2; S^-1 g_s, s/rad
-    N, D           sums as above; N_p, N_c: shares of N by p = lambda (g - g_0) and by a coarse gust
+    N, D           sums as above; N_p, N_c: shares of N by p and by a coarse gust
     Z, tol, R      regressor, rad/s2; its tolerance; R_j
     e_R            sum tol |R|
-    eta, eta_0     eta_bar, rad/s2; eta_bar |g_0|, rad/s
+    eta, eta_0     eta_bar, rad/s2; eta_bar |g_inf|, rad/s
     eta_r          eta_bar RINGING / K_d, rad/s
     eta_rate       omega dt
     e_0, e_tv, e_w shares of |N| by eta_bar: sums of eta_0 |w|, eta_r TV(w), eta_r eta_rate |w|
     th             theta
 
-statistical.md writes nu~_chi for g_s, chi for s, N_j for R_j, room for the share of |N| by eta_bar, z for
-the alarm level.
+statistical.md writes nu~_chi for g_s, chi for s, N_j for R_j, d for delta, room for the share of |N| by
+eta_bar, z for the alarm level.
 """
 
 from math import sqrt
@@ -90,12 +95,12 @@ def reset_slot(b, slot):
 
 @kernel
 def bound_responses(b, dt):
-    """Fill eta_0 = eta |g_0| and eta_r = RINGING_FACTOR |K_d^-1| eta, (2,) rad/s.
+    """Fill eta_0 = eta |g_inf| and eta_r = RINGING_FACTOR |K_d^-1| eta, (2,) rad/s.
 
-        g_0 = dt (1 - a) / (K_x (1 - a) + dt K_d)      |K_d^-1|_ij = |c_ij / det|
+        g_inf = dt (1 - a) / (K_x (1 - a) + dt K_d)      |K_d^-1|_ij = |c_ij / det|
 
-    g_0 s: response to a unit constant that the drift leaves in the end, on an axis by itself; c_ij: cofactors
-    of K_d, det: its determinant.
+    g_inf s: response to a unit constant that the drift leaves in the end, on an axis by itself; c_ij:
+    cofactors of K_d, det: its determinant.
     """
     K_d = b.K_d
     lost = 1.0 - b.a
@@ -139,8 +144,8 @@ def accumulate_tests(b, t, n, dt, decay):
         e_0 <- decay e_0 + eta_0' |w|              e_tv <- decay e_tv + eta_r' |w - w_before|
         e_w <- decay e_w + eta_rate eta_r' |w|
 
-    Letters as at the top. g_s follows `whiten_step` with v = s, which
-    is written out for vectors of tests. In a block of one axis all values of a second axis are zero.
+    g_s follows `whiten_step` with v = s, which is written out for vectors of tests. In a block of one axis
+    all values of a second axis are zero. decay: factor on the evidence of earlier frames.
     """
     x = t.x_s
     g_s = t.g_s
@@ -189,11 +194,11 @@ def accumulate_regressors(b, t, R, n, decay):
     """
     w = t.w
     e_R = t.e_R
-    g = b.g_Z
+    g_Z = b.g_Z
     e_R[:n] = 0.0
     for j in range(b.n_Z):
-        g_0 = g[j, 0]
-        g_1 = g[j, 1]
+        g_0 = g_Z[j, 0]
+        g_1 = g_Z[j, 1]
         tol_j = b.tol[j]
         for k in range(n):
             R_j = decay * R[j, k] + (w[0, k] * g_0 + w[1, k] * g_1)
@@ -218,9 +223,9 @@ def accumulate_evidence(b, dt, decay):
 def uncertain_share(t, k, r0, r1):
     """The share of |N| in test k that a bounded uncertainty explains, the room of statistical.md:
 
-        room = e_0 + min(e_tv + eta_r' |w|, e_w)  <=  eta_bar (|g_0| sum |w| + RINGING / K_d sum |dw|)
+        room = e_0 + min(e_tv + eta_r' |w|, e_w)  <=  eta_bar (|g_inf| sum |w| + RINGING / K_d TV(w))
 
-    dw: change of w from frame to frame; r0, r1: eta_r of the two axes. eta_r' |w| is the change when the
+    r0, r1: eta_r of the two axes. eta_r' |w| is the change when the
     weight drops to zero after the last frame. The changes of a slow uncertainty itself may be less: then e_w
     takes the place of those of w.
     """
@@ -262,10 +267,10 @@ def evaluate_tests(b, t, n, without_eta, mapped):
     """Fill the score and the log-likelihood ratios of the first n tests of a group t; without information
     they are 0, and llr is -1.
 
-        score = (N_s - e) / max(sqrt(D), room / z + share sqrt(D))
-        llr = max_llr(N_s)      llr_lo, llr_hi = max_llr(N_s -+ (e + room))
+        score = (N_s - allowed) / max(sqrt(D), room / z + share sqrt(D))
+        llr = max_llr(N_s)      llr_lo, llr_hi = max_llr(N_s -+ (allowed + room))
 
-    N_s: sign N, or |N| if sign is 0; e = e_R + max(sign N_p, 0) + max(sign N_c, 0); room: of
+    N_s: sign N, or |N| if sign is 0; allowed = e_R + max(sign N_p, 0) + max(sign N_c, 0); room: of
     `uncertain_share`; z: alarm level; share: `noise_share`.
 
     without_eta: the bounds on the ratios leave out the room. mapped: for hypotheses that have no sign they
@@ -281,13 +286,13 @@ def evaluate_tests(b, t, n, without_eta, mapped):
         signed = sign != 0.0
         known = D > 0.0
         N_s = sign * t.N[k] if signed else abs(t.N[k])
-        e = t.e_R[k] + max(sign * t.N_p[k], 0.0) + max(sign * t.N_c[k], 0.0)
+        allowed = t.e_R[k] + max(sign * t.N_p[k], 0.0) + max(sign * t.N_c[k], 0.0)
         room = uncertain_share(t, k, r0, r1)
-        score = evidence_ratio(z, share, N_s - e, room, D)
-        e += 0.0 if without_eta and (signed or not mapped) else room
+        score = evidence_ratio(z, share, N_s - allowed, room, D)
+        allowed += 0.0 if without_eta and (signed or not mapped) else room
         llr = max_llr(signed, N_s, D)
-        lo = max_llr(signed, N_s - e, D)
-        hi = max_llr(signed, N_s + e, D)
+        lo = max_llr(signed, N_s - allowed, D)
+        hi = max_llr(signed, N_s + allowed, D)
         t.score[k] = score if known else 0.0
         t.llr_lo[k] = lo if known else 0.0
         t.llr_hi[k] = hi if known else 0.0

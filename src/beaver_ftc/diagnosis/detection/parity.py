@@ -1,20 +1,20 @@
 """Parity tests: they exclude a surface for any type and time history of its fault.
 
-A fault of surface s accelerates the aircraft along the column g = G_s only, rad/s2 per rad. The projection of
-the innovation nu, rad/s2, on a parity direction m that is orthogonal to this column,
+A fault of surface s accelerates the aircraft along its column G of the effects only, rad/s2 per rad. The
+projection of the innovation nu, rad/s2, on a parity direction m that is orthogonal to this column,
 
-    m' nu        with  m' g = 0,  |m| = 1
+    m' nu        with  m' G = 0,  |m| = 1
 
 does not depend on a fault of s. If a test finds a signal in this projection, s is not the (only) cause. Each
 direction is a view: a block of one axis (blocks.py) with tests for a step, for a loss of another surface
 and for an oscillation (tones.py). The directions are
 
 * each axis, for the surfaces that do not move it;
-* in a plane of two rows, the direction across the column g of each surface that moves both. The planes are
+* in a plane of two rows, the direction across the column G of each surface that moves both. The planes are
   roll and yaw; if accelerometers are used (forces.py), also pitch and normal force, and roll or yaw and side
   force.
 
-*Leak.* Errors e of the column turn it. Then a share of the innovation along g leaks into the view
+*Leak.* Errors e_G of the column turn it. Then a share of the innovation along G leaks into the view
 (`turn_view`). It is tolerated like an error of a coefficient. A test excludes at the alarm level, so noise
 and bounded uncertainty exclude as rarely as they raise an alarm.
 
@@ -44,13 +44,16 @@ What each view may do, by what is subtracted from its rates (`source`), if the f
 (*) Its direction has |m_j| > MIN_FORCE_PART in the row j of its force, and accelerometers cannot break. If
 the forces are not used, a view that sees a force scores 0, and no other needs confirmation.
 
-Letters of the kernels, in addition to those of likelihood.py and rows.py:
+Letters of the kernels:
 
-    m, col      direction of a view, and g / |g|, (5,)
-    g, e        column of G that a view nulls, and the bound on its error (`rows.e_G`), rad/s2 per rad
-    b, f        block of a view; record of a force; b.source: what is subtracted from its rates (rows.py);
-                from VANELESS on no vane is used
-    L           acceleration per rad/s of the aircraft against the air, 1/s
+    m, col      direction of a view, and G / |G|, on the five rows of rows.py
+    G, e_G      column that a view nulls, and the bound on its error, on these rows, rad/s2 per rad
+    i, k, j     the rows that a view combines (`places`)
+    b, f        block of a view (blocks.py); record of a force; b.source: what is subtracted from its rates
+                (rows.py); from VANELESS on no vane is used
+    eta, Q_d    bound on the uncertainty along m, rad/s2; intensity of the drift of the view, (rad/s2)2/s
+    L, C        acceleration per rad/s of the aircraft against the air, 1/s; axes of the gusts (gusts.py)
+    V           airspeed, m/s
     stat, cfg   record of the detector (statistical.py), and its configuration of the tests
 
 parity_design.py fills the views from what a scenario declares.
@@ -116,7 +119,7 @@ def view_dtype(size: BlockCapacity) -> np.dtype:
     return record(
         nulled=int,  # the column of `rows.G` to which the direction is orthogonal, or AXIS_VIEW
         alarm_axis=int,  # axis that an alarm of this view reports
-        # the rows (i, k, j) that it combines: k = -1 if only two, j the force if it sees one; col: g / |g|
+        # the rows (i, k, j) that it combines: k = -1 if only two, j the force if it sees one; col: G / |G|
         places=(int, 3), col=5,
         by_force=int,  # whether it sees a force
         confirmer=int,  # row of the force of the views that confirm this one, if it is VANED
@@ -128,46 +131,45 @@ def view_dtype(size: BlockCapacity) -> np.dtype:
 
 @kernel
 def turn_view(view, rows, gust):
-    """Turn a view across the column g of what it nulls: of a surface, or of an error of a vane.
+    """Turn a view across the column G of what it nulls: of a surface, or of an error of a vane.
 
-        m = g x q / |g x q|      col = g / |g|      on the rows i, k, j of `places`
+        m = G x q / |G x q|      col = G / |G|      on the rows i, k, j of `places`
 
     q: the effect of the rolling gust on the rows i and k, 1/s, 0 on j, so that the view shows no rolling gust
     either. Without a row k, q is the unit vector of its place, and m lies in the plane of i and j. If
-    g x q = 0, as in the first frame, the view keeps its direction, and the share is 0.
+    G x q = 0, as in the first frame, the view keeps its direction, and the share is 0.
 
-    Returns the share of the innovation along g that errors e of g (`e_G`) let leak into the view:
+    Returns the share of the innovation along G that errors e_G of G let leak into the view:
 
-        |m|' e / max(|g| - |col|' e, MIN_NORM_SHARE |g|)
+        |m|' e_G / max(|G| - |col|' e_G, MIN_NORM_SHARE |G|)
     """
     m = view.block.m[0]
     col = view.col
-    c = view.nulled
+    G = rows.G[view.nulled]
+    e_G = rows.e_G[view.nulled]
     i = view.places[0]
     k = view.places[1]
     j = view.places[2]
     L = gust.output.rate_damping
     C = gust.output.C
-    g_i = rows.G[c, i]
-    g_j = rows.G[c, j]
-    g_k = rows.G[c, k] if k >= 0 else 0.0
+    G_k = G[k] if k >= 0 else 0.0
     q_i = project_gust(L[i], C, ROLL) if k >= 0 else 0.0
     q_k = project_gust(L[k], C, ROLL) if k >= 0 else 1.0
-    m_i = -g_j * q_k
-    m_k = g_j * q_i
-    m_j = g_i * q_k - g_k * q_i
-    norm = np.sqrt(g_i * g_i + g_k * g_k + g_j * g_j)
+    m_i = -G[j] * q_k
+    m_k = G[j] * q_i
+    m_j = G[i] * q_k - G_k * q_i
+    norm = np.sqrt(G[i] * G[i] + G_k * G_k + G[j] * G[j])
     norm_m = np.sqrt(m_i * m_i + m_k * m_k + m_j * m_j)
     if norm_m == 0.0:
         return 0.0
-    e = e_col = 0.0
-    for r, g_r, m_r in ((i, g_i, m_i), (k, g_k, m_k), (j, g_j, m_j)):
+    e_m = e_col = 0.0
+    for r, m_r in ((i, m_i), (k, m_k), (j, m_j)):
         if r >= 0:
             m[r] = m_r / norm_m
-            col[r] = g_r / norm
-            e += abs(m[r]) * rows.e_G[c, r]
-            e_col += abs(col[r]) * rows.e_G[c, r]
-    return e / max(norm - e_col, MIN_NORM_SHARE * norm)
+            col[r] = G[r] / norm
+            e_m += abs(m[r]) * e_G[r]
+            e_col += abs(col[r]) * e_G[r]
+    return e_m / max(norm - e_col, MIN_NORM_SHARE * norm)
 
 
 @kernel
@@ -221,9 +223,9 @@ def project_view(view, stat, vaned, V):
 
 
 @kernel
-def update_views(stat, vaned, y, dt, k, latched):
-    """Bring filter and tests of each view to frame k, as `statistical.update_blocks`; y (4 + signals,)
-    measured; vaned: of `project_view`.
+def update_views(stat, vaned, y, dt, frame, latched):
+    """Bring filter and tests of each view to this frame, as `statistical.update_blocks`; frame: its number;
+    y (4 + signals,) measured; vaned: of `project_view`.
 
         peak <- max((1 - (1 - forget) / PEAK_MEMORY_RATIO) peak, score)
 
@@ -235,7 +237,7 @@ def update_views(stat, vaned, y, dt, k, latched):
     forces = stat.forces
     inside = within_limits(c, y)
     decay = cfg.forget if latched else 1.0
-    slot = restarting_slot(k)
+    slot = restarting_slot(frame)
     for view in stat.views[: stat.n_views]:
         if view.by_force and not (forces.in_use and forces.n_seen == MIN_UPDATES):
             view.peak = 0.0

@@ -1,6 +1,6 @@
 """The parity views as they follow from an aircraft and from what a scenario declares.
 
-Letters as in parity.py; d: a `ParityDirection`; b: the block of a view.
+d: a `ParityDirection`; b: the block of a view (blocks.py); m: its direction on the five rows of rows.py.
 """
 
 from collections.abc import Iterator

@@ -4,14 +4,18 @@ An error e of an air-data reading changes f + G u by e times its derivative with
 The derivative depends on the flight condition and is evaluated in flight. dpt is worked out from the engine's
 power, airspeed and dynamic pressure, so it has their errors. Noise of the readings is model noise:
 
-    Z_c <- Z_c + w dF_c      Q = Q0 + sum_j (dF_j sigma_j)^2, (rad/s2)2
+    Z_c <- Z_c + share dF_c      Q = Q0 + sum_j (dF_j sigma_j)^2, (rad/s2)2
 
-Letters of the kernels, in addition to those of statistical.py:
+Letters of the kernels:
 
     c, k, j     column of Z, an unknown constant; term; reading of the air data
+    i, s        axis, surface
+    share       of an instant in its frame: one over the number of instants
+    eta, Q      bound on the uncertainty, rad/s2; variance of the noise, (rad/s2)2; both (3,)
     dF_c (3,)   acceleration per unit of the constant
     tab         table of the moments (design/table.py), with its signals s and monomials m_k
     y, u        readings; surfaces, rad
+    err         declared errors (`bounds.errors_dtype`); model: the design model
     meas        record of the readings: y, and rates x (3,) rad/s
 """
 
@@ -141,11 +145,11 @@ def fill_constants(noise, tab, err, y, u, first, n):
 
 
 @kernel
-def add_constants(w, noise, rows, err, model, meas, u):
-    """Add an instant, which is the share w of the frame, to Z of the rates, rad/s2 per unit of each constant;
+def add_constants(share, noise, rows, err, model, meas, u):
+    """Add an instant, which is this share of the frame, to Z of the rates, rad/s2 per unit of each constant;
     if `noisy`, fill Q as it is at this instant.
 
-        Z_c <- Z_c + w dF_c      Q = Q0 + sum_j (dF_j sigma_j)^2,  j: readings
+        Z_c <- Z_c + share dF_c      Q = Q0 + sum_j (dF_j sigma_j)^2,  j: readings
     """
     n = rows.n
     if n == 0:
@@ -159,14 +163,14 @@ def add_constants(w, noise, rows, err, model, meas, u):
         if noise.noisy:
             noise.Q[i] = noise.Q0[i]
         for c in range(n):
-            rows.Z[c, i] += w * dF[i, c]
+            rows.Z[c, i] += share * dF[i, c]
             if c >= first:
                 noise.Q[i] += (dF[i, c] * noise.sigma[c - first]) ** 2
 
 
 @kernel
-def begin_rows(w, noise, rows, bound, model, meas, u):
-    """Begin the rows of the next frame at this instant, which is the share w of it: Z, eta and std[RATES].
+def begin_rows(share, noise, rows, bound, model, meas, u):
+    """Begin the rows of the next frame at this instant, which is this share of it: Z, eta and std[RATES].
 
     eta[0] = published bound + |G| du + min(mapped error, OFF_MAP_RAD_S2)
     eta[1] = eta[0], and, if one surface may be anywhere, the further error of the map over the whole travel
@@ -176,7 +180,7 @@ def begin_rows(w, noise, rows, bound, model, meas, u):
     eta = rows.eta[0]
     emap = bound.error_map
     rows.Z[: rows.n] = 0.0
-    add_constants(w, noise, rows, bound.declared_errors, model, meas, u)
+    add_constants(share, noise, rows, bound.declared_errors, model, meas, u)
     eta[:3] = 0.0
     add_published_bound(meas.x, model, bound.coupling_share, bound.const, bound.earth_rate_rad_s, eta)
     for i in range(3):

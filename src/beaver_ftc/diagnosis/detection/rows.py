@@ -3,11 +3,11 @@
 The rows are roll, pitch and yaw, of the rates (rates.py), and side force and normal force (forces.py); all in
 rad/s2. On each of them an instant says
 
-    nu = sum_s theta_s Gu_s + sum_j c_j Z_j + d + noise          |c_j| <= tol_j,  |d| <= eta
+    nu = sum_s theta_s Gu_s + sum_j c_j Z_j + delta + noise      |c_j| <= tol_j,  |delta| <= eta
 
 nu is the innovation; Gu_s the effect of surface s at its command, of which a loss takes the share -theta_s;
 Z_j the effect of an unknown constant c_j: of a coefficient of the moments, of a reading of the air data, of a
-term of a force; d is a bounded uncertainty.
+term of a force; delta is a bounded uncertainty.
 
 A block of the rates and a parity view both see these rows in one or two directions m (5,):
 

@@ -12,12 +12,12 @@ Symbols of the kernels:
     nu (3,) rad/s2                innovation of the frame
     eta (3,) rad/s2               bound on the uncertainty
     y; u (n,) rad                 readings; positions of healthy surfaces
-    w                             one over the number of instants in a frame
     dt s, k                       duration and number of the frame
-    b, m, h, v                    block and its number, hypothesis, view
+    V m/s                         airspeed
+    b, h, v                       block, hypothesis, view
     s; i, j                       surface; axes of a block
     fies                          isolation estimators
-    loss_number (n,)              number e of the estimator of each surface's loss, or -1
+    loss_number (n,)              number of the estimator of each surface's loss, or -1
     lo, hi                        bounds on a log-likelihood ratio: places LO and HI of a pair
     stat                          the record of the detector, of `statistical_dtype`
     cfg, noise, gust, bound       records of the tests, the noise model, the gust estimate, the bounds
@@ -109,7 +109,7 @@ def update_blocks(stat, dt, k, alarmed, may_end=False):
     blocks = stat.block
     decay = cfg.forget if alarmed else 1.0
     slot = restarting_slot(k)
-    for m, b in enumerate(blocks):
+    for place, b in enumerate(blocks):
         if not alarmed:
             likelihood.reset_slot(b, slot)
         project_rows(b, stat.rows)
@@ -119,7 +119,7 @@ def update_blocks(stat, dt, k, alarmed, may_end=False):
                 b.g_c[i] = gust.output.acc_coarse[axis]
         if gust.output.gusty:
             add_turn_to_drift(b, gust)
-            if m < REVERTING_BLOCK:
+            if place < REVERTING_BLOCK:
                 whiten_calm(b, dt)
             else:  # without gust both blocks of roll and yaw have the same filter
                 b.calm.g = blocks[LATERAL_BLOCK].calm.g
@@ -198,8 +198,8 @@ def best_alternative(b, fies, loss_number, s, revived=False):
         if h.kind in (GROWING_LOSS, LOSS_END):
             continue
         if h.kind == LOSS:
-            e = loss_number[h.surface]
-            if h.surface == s or (e >= 0 and fies[e].excluded and not revived):
+            number = loss_number[h.surface]
+            if h.surface == s or (number >= 0 and fies[number].excluded and not revived):
                 continue
         lo = max(lo, h.llr_lo)
     return lo
@@ -286,16 +286,16 @@ def prepare_tests(stat, bound, model, meas, u, dt):
     """
     noise = stat.noise
     gust = stat.gust
-    w = stat.test.w
+    share = stat.test.w
     V = meas.y[AIRSPEED]
     if gust.output.gusty:
         fill_gust_effect(gust, model, meas.x, meas.y, u)
-    begin_rows(w, noise, stat.rows, bound, model, meas, u)
+    begin_rows(share, noise, stat.rows, bound, model, meas, u)
     fill_drift(noise, stat.rows.eta[0], stat.block, gust, V, dt)
     if bound.error_map.n_boxes > 0:
         update_eta_rate(noise, stat.block, bound.error_map, u)
     if gust.output.gusty:
-        begin_gust_sums(gust, V, w * dt)
+        begin_gust_sums(gust, V, share * dt)
 
 
 @kernel
@@ -334,8 +334,8 @@ def fill_drift(noise, eta, blocks, gust, V, dt):
     random walk, a = 1; q 1/s. The filter without gust has the second term alone.
     """
     gusty = gust.output.gusty
-    for m, b in enumerate(blocks):
-        reverts = m == REVERTING_BLOCK
+    for place, b in enumerate(blocks):
+        reverts = place == REVERTING_BLOCK
         length = b.drift_length_m
         for i, axis in enumerate(b.axes[: b.n]):
             for j in range(b.n):

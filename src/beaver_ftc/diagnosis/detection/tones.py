@@ -1,27 +1,33 @@
 """Oscillation tests: spectra of the whitened innovation g of a view at the frequencies of a grid.
 
 An oscillating surface adds a tone of unknown amplitude and phase to a view (parity.py). The whitening filter
-is linear, so the whitened innovation contains the same tone. For each frequency w, rad/s, the test computes
+is linear, so the whitened innovation contains the same tone. For each frequency omega, rad/s, the test
+computes
 
-    N = sum exp((i w - 1 / T) t) g / sqrt(S)          summed over past frames; t s is the age of a frame
+    N = sum exp((i omega - 1 / T) t) g / sqrt(S)          summed over past frames; t s is the age of a frame
 
 with S the variance of g, (rad/s)2, and T = TONE_MEMORY_S. Without a fault the real and the imaginary part of
 N are normal. With v the larger of their variances, |N| / sqrt(v) exceeds x with a probability of exp(-x^2 /
-2) at most. Two errors can add to |N| without a fault (symbols as in likelihood.py):
+2) at most. Two errors can add to |N| without a fault:
 
-* Errors of coefficients add at most sum_j tol_j |R_j|, where R_j is the same sum over regressor j.
-* A bounded uncertainty |d| <= eta_bar adds at most |W(w)| sum eta_bar exp(-t / T) |cos|, where W is the gain
-  of the whitening filter at w. The limited rate of change of d reduces this a little
+* Errors of coefficients c_j, |c_j| <= tol_j, add at most sum_j tol_j |R_j|, where R_j is the same sum over
+  the response g_Zj to regressor j.
+* A bounded uncertainty |delta| <= eta_bar adds at most |W(omega)| sum eta_bar exp(-t / T) |cos|, where W is
+  the gain of the whitening filter at omega. The limited rate of change of delta reduces this a little
   (`max_tone_mean`).
 
 The sums are updated once per TONE_INTERVAL_S: no frequency of the grid changes its phase much in that
 time.
 
-Letters of the kernels, in addition to those of likelihood.py: k is a frequency.
+Letters of the kernels:
 
-    t, b, c     record of the tests of a view; its block; their configuration
-    N, R        sums as above, (N_TONES,) and (n_Z, N_TONES) complex
-    z, rho      exp(i w dt); exp((i w - 1 / T) dt) of an update; rho2: of 2 w
+    t, b, c           record of the tests of a view; its block (blocks.py); their configuration
+    j, k              regressor, frequency
+    N, R              sums as above, (N_TONES,) and (n_Z, N_TONES) complex
+    g, g_Z            whitened innovation, and responses to the regressors, rad/s; 1 / S is S_inv of the block
+    K_x, K_d, a       gains of the block's filter, 1/s, and decay of its drift; a of c: decay in an update
+    z, rho            exp(i omega dt); exp((i omega - 1 / T) dt) of an update; rho2: of 2 omega
+    e_R, eta          the most that coefficients, and the bounded uncertainty, add to |N|
 """
 
 from math import exp, pi, sqrt
@@ -50,9 +56,9 @@ TONE_RECORD = record(
     V_min=float, V_max=float,  # airspeeds, m/s, between which the tests run
     stride=int, alarm_level=float,  # frames per update; alarm level, standard deviations
     a=float, z=(complex, N_TONES), rho=(complex, N_TONES), rho2=(complex, N_TONES),  # a: decay in an update
-    # c: largest mean of cos(w t) d(t) for |d| <= 1 (`max_tone_mean`); v_share: share of the variance of N
-    # that is the larger of the variances of its two parts
-    c=N_TONES, v_share=N_TONES,
+    # mean_max: `max_tone_mean`; v_share: share of the variance of N that is the larger of the variances of
+    # its two parts
+    mean_max=N_TONES, v_share=N_TONES,
 )  # fmt: skip
 
 
@@ -84,7 +90,7 @@ def within_limits(c, y):
 def update_tones(t, b, c, level, inside, dt):
     """Update the tests of a view with one frame, which its block b has whitened; dt s.
 
-        N <- exp((i w - 1 / T) dt_u) N + g / sqrt(S)      R_j: the same of g_Zj
+        N <- exp((i omega - 1 / T) dt_u) N + g / sqrt(S)      R_j: the same of g_Zj
 
     Once per update, of dt_u = stride dt s, with the sums over its frames; their ages differ by less than
     dt_u. level: alarm level of the detector, standard deviations. Unless `inside`, the frame counts as zero,
@@ -120,10 +126,10 @@ def resonate(N, rho, v):
 
 @kernel
 def tone_gain(K_x, K_d, a, z, dt):
-    """|W(w)|: amplitude of g, rad/s, by a tone of amplitude 1 rad/s2 at constant gains; dt s a frame.
+    """|W(omega)|: amplitude of g, rad/s, by a tone of amplitude 1 rad/s2 at constant gains; dt s a frame.
 
     g = e + dt (nu - d),  e <- g - K_x g,  d <- a d + K_d g:
-    |W| = dt / |1 - (1 - K_x) / z + dt K_d / (z - a)|,  z = exp(i w dt)
+    |W| = dt / |1 - (1 - K_x) / z + dt K_d / (z - a)|,  z = exp(i omega dt)
     """
     return dt / abs(1.0 - (1.0 - K_x) * z.conjugate() + dt * K_d / (z - a))
 
@@ -132,19 +138,20 @@ def tone_gain(K_x, K_d, a, z, dt):
 def update_tone_eta(t, c, b, dt):
     """Update `eta` of each frequency: nearly the most that a bounded uncertainty adds to |N|.
 
-        b_0 <- a b_0 + v      b_2 <- rho2 b_2 + v      eta_k = c (b_0 + |b_2|),  v = |W| sum_eta
+        b_0 <- a b_0 + added,    b_2 <- rho2 b_2 + added,    added = |W| sum_eta
+        eta_k = mean_max (b_0 + |b_2|)
 
-    sum_eta: sum over the frames of the update of the bound over sqrt(S); |W|: `tone_gain`; c: of TONE_RECORD.
+    sum_eta: sum over the frames of the update of the bound over sqrt(S); |W|: `tone_gain`; a: of c.
 
     |cos x| = 2 / pi (1 + 2/3 cos 2x - 2/15 cos 4x + ...). A bound that varies at twice the tone's frequency
     adds most; the last third of |b_2| is for the harmonics above. One that varies at four times the frequency
     or more can add a tenth more than that.
     """
     for k in range(t.eta.size):
-        v = t.sum_eta * tone_gain(b.K_x[0, 0], b.K_d[0, 0], b.a, c.z[k], dt)
-        t.b_0[k] = c.a * t.b_0[k] + v
-        t.b_2[k] = c.rho2[k] * t.b_2[k] + v
-        t.eta[k] = c.c[k] * (t.b_0[k] + abs(t.b_2[k]))
+        added = t.sum_eta * tone_gain(b.K_x[0, 0], b.K_d[0, 0], b.a, c.z[k], dt)
+        t.b_0[k] = c.a * t.b_0[k] + added
+        t.b_2[k] = c.rho2[k] * t.b_2[k] + added
+        t.eta[k] = c.mean_max[k] * (t.b_0[k] + abs(t.b_2[k]))
 
 
 @kernel
@@ -156,9 +163,9 @@ def bound_coefficients(t, tol, n_Z):
     t.e_R[:] = 0.0
     for j in range(n_Z):
         for k in range(t.e_R.size):
-            x = abs(t.R[j, k].real)
-            y = abs(t.R[j, k].imag)
-            t.e_R[k] += tol[j] * (max(x, y) + SQRT2_LESS_1 * min(x, y))
+            real = abs(t.R[j, k].real)
+            imag = abs(t.R[j, k].imag)
+            t.e_R[k] += tol[j] * (max(real, imag) + SQRT2_LESS_1 * min(real, imag))
 
 
 @kernel
@@ -176,20 +183,21 @@ def score_tones(t, c, level):
     t.score = score * level / c.alarm_level
 
 
-def max_tone_mean(w: np.ndarray, rate: float) -> np.ndarray:
-    """Largest mean of cos(w t) d(t) over all d with |d| <= 1 and |d'| <= rate; frequencies w (n,) rad/s.
+def max_tone_mean(omega: np.ndarray, rate: float) -> np.ndarray:
+    """Largest mean of cos(omega t) delta(t) over all delta with |delta| <= 1 and |delta'| <= rate;
+    frequencies omega (n,) rad/s.
 
     The largest is reached by a square wave with edges of the slope `rate`, or, at frequencies where these
     edges do not reach 1, by a triangular wave.
     """
-    ratio = w / rate
+    ratio = omega / rate
     return 2.0 / pi * np.where(ratio < pi / 2.0, np.sin(ratio), 1.0) / ratio
 
 
 def configure_tones(c: np.void, false_alarm: float, V: float, rate: float, dt: float) -> None:
     """Fill the configuration that all views share (TONE_RECORD).
 
-        alarm_level = sqrt(-2 ln false_alarm)      rho = exp((i w - 1 / T) stride dt)
+        alarm_level = sqrt(-2 ln false_alarm)      rho = exp((i omega - 1 / T) stride dt)
 
     false_alarm: probability of a false alarm granted to one test in one frame. V: airspeed in trim, m/s.
     rate: largest rate of change of a bounded uncertainty, bounds per second. dt s a frame.
@@ -198,10 +206,10 @@ def configure_tones(c: np.void, false_alarm: float, V: float, rate: float, dt: f
     z = np.exp(1j * TONES_RAD_S * dt)
     a = exp(-stride * dt / TONE_MEMORY_S)
     rho = a * z**stride
-    # The variances of the two parts differ by |sum exp(2 (i w - 1 / T) t)| / sum exp(-2 t / T).
+    # The variances of the two parts differ by |sum exp(2 (i omega - 1 / T) t)| / sum exp(-2 t / T).
     v_share = 0.5 + 0.5 * (1.0 - a**2) / np.abs(1.0 - rho**2)
     fill(
         c, V_min=V / MAX_V_FACTOR, V_max=V * MAX_V_FACTOR, stride=stride, a=a, z=z, rho=rho,
         rho2=a * z ** (2 * stride), alarm_level=sqrt(-2.0 * np.log(false_alarm)),
-        c=max_tone_mean(TONES_RAD_S, rate), v_share=v_share,
+        mean_max=max_tone_mean(TONES_RAD_S, rate), v_share=v_share,
     )  # fmt: skip

@@ -15,11 +15,11 @@ For nu of the flight, g is the whitened innovation; for a signature or a regress
 response.
 
 The declared drift is an upper limit. In calmer air the filter interprets gyro noise as gust, and its
-innovation g is then partly predictable: from p = g - g_0, where g_0 is the innovation of a second filter
-without gust, `calm`. The control law reacts to the same noise, so a loss would seem to be present without
-one. The fraction of p in g is estimated, lambda = sum p' S^-1 g / sum p' S^-1 p: 0 in air as declared, 1 in
-calm air; `update_calm_part` takes it larger, to be safe. The evidence that lambda p contributes is subtracted
-(likelihood.py).
+innovation g is then partly predictable: from p = g - g_calm, where g_calm is the innovation of a second
+filter without gust, `calm`. The control law reacts to the same noise, so a loss would seem to be present
+without one. The fraction of p in g is estimated, lambda = sum p' S^-1 g / sum p' S^-1 p: 0 in air as
+declared, 1 in calm air; `update_calm_part` takes it larger, to be safe. The evidence that lambda p
+contributes is subtracted (likelihood.py).
 
 Letters of the kernels. A block b has n axes, 1 or 2; i and j are axes; a digit at the end is an axis.
 
@@ -179,12 +179,12 @@ def whiten_calm(b, dt):
 def update_calm_part(b, dt):
     """Fill `p` (2,) rad/s with lam p, the part of g that calm air makes predictable.
 
-        p = g - g_0      pg = sum p' S^-1 g      pp = sum p' S^-1 p
+        p = g - g_calm      pg = sum p' S^-1 g      pp = sum p' S^-1 p
         lam = (pg + CALM_PRIOR + CALM_STDS sqrt D) / D in [0, 1],      D = pp + CALM_PRIOR
 
-    The sums fade with the time constant CALM_MEMORY_S. g_0: g of `calm`, which `whiten_calm` has filled in
-    this frame. lam is the estimate of least squares with a prior for calm air, CALM_STDS standard deviations
-    larger.
+    The sums fade with the time constant CALM_MEMORY_S. g_calm: g of `calm`, which `whiten_calm` has filled
+    in this frame. lam is the estimate of least squares with a prior for calm air, CALM_STDS standard
+    deviations larger.
     """
     p = b.p
     g = b.g

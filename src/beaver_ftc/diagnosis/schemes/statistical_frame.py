@@ -83,8 +83,8 @@ def prepare_gusts(fdi, prediction, measured, k):
 def add_gust_instant(fdi, prediction, measured):
     """Add an instant inside a frame to the gust that the vanes measure, its effect, and the rows of the
     rates."""
-    h = prediction.w * fdi.config.dt
-    statistical.add_test_instant(fdi.statistical, fdi.bound, prediction.design, measured, prediction.u, h)
+    dt = prediction.w * fdi.config.dt
+    statistical.add_test_instant(fdi.statistical, fdi.bound, prediction.design, measured, prediction.u, dt)
 
 
 @kernel

@@ -8,8 +8,11 @@ Where the noise of a gyro makes single frames uninformative, frames are examined
 and "frame" below means a block. To the types a block is like a frame of several JSBSim steps: a block next to
 a healthy one is skipped.
 
-types: of `fault_types_dtype`. est: the estimators of the isolation; the layout has their numbers. bound: of
-`bound_dtype`. Other symbols: types/__init__.py.
+    types           record of `fault_types_dtype`; c: its configuration
+    s, srf          surface, and its record (records.py); ev: its `evidence`
+    h, k            number of a type, judged frame
+    est, fie        estimators of the isolation, whose numbers the layout has, and one of them
+    nu, bound       innovation (3,) rad/s2, record of `bound_dtype`
 """
 
 from beaver_ftc.compiled import kernel

@@ -11,9 +11,9 @@ mean of a constant position, offset or effectiveness is exact; that of a varying
 extremes. Without noise a block is one frame, and its commands are recorded all the same.
 
     types    of `fault_types_dtype`; N: frames_per_block
+    s, srf   surface, and its record (records.py)
     cmd      COMMANDS_RECORD of a surface; index 0 is the elapsed block, 1 the one before it
-
-Other symbols: types/__init__.py.
+    u        deflection of a healthy surface, rad
 """
 
 import numpy as np

@@ -1,14 +1,16 @@
 """What the law does about each surface at fault: its mode of accommodation, with what the mode needs.
 
-    GIVE_UP, SCALE_COMMAND, WAIT_FOR_SURFACE    serve some types each (`FaultType.accommodation_mode`)
-    SUBTRACT_OFFSET                             serves the other types, and all while the mode is open
+GIVE_UP, SCALE_COMMAND, WAIT_FOR_SURFACE    serve some types each (`FaultType.accommodation_mode`)
+SUBTRACT_OFFSET                             serves the other types, and all while the mode is open
 
-    presumed    the surface that the law acts on while none is isolated
-    lead        the surface, and its mode, that the supervisor of the law follows (control/accommodation.py)
-    silent      a fault with whose deflection error the last frame does not agree
+presumed    the surface that the law acts on while none is isolated
+lead        the surface, and its mode, that the supervisor of the law follows (control/accommodation.py)
+silent      a fault with whose deflection error the last frame does not agree
 
-types: of `fault_types_dtype`; layout: of `layout.layout_dtype`. Other symbols: remaining.py, verdict.py,
-types/__init__.py.
+types       record of `fault_types_dtype`; layout: of `layout.layout_dtype`
+s, srf      surface, and its record (records.py)
+kind        a type, TYPE_UNDECIDED or NO_TYPE (remaining.py)
+sole        the only surface, or type, that remains
 """
 
 import numpy as np

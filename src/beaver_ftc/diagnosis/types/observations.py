@@ -1,7 +1,12 @@
 """Observations: where a surface was, if it alone is at fault (or by pairs.py).
 
 A surface has those of three frames or blocks: `last` is of the elapsed frame, `judged` of the one before it,
-`earlier` of the one before that. Symbols: types/__init__.py.
+`earlier` of the one before that.
+
+    srf             record of a surface (records.py)
+    nu, nu_max      (3,) rad/s2: innovation, and its bound without a fault
+    eff             effect of a fault of this surface (estimators.EFFECT_RECORD)
+    u, p, lo, hi    rad: deflection of a healthy surface, of this one, and the interval of p
 """
 
 from beaver_ftc.compiled import copy, kernel, record

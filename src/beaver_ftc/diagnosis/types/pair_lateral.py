@@ -7,8 +7,10 @@ remains on each.
 
     types     record of `fault_types_dtype`
     layout    gives the surfaces that lead roll and yaw (main)
-
-Other symbols: verdict.py, remaining.py, types/__init__.py.
+    s, srf    surface, and its record (records.py)
+    est       estimators of the isolation; eff: effect of the fault of one of them
+    nu        (3,) rad/s2: innovation; nu_max: its bound without a fault
+    lo, hi    interval of a deflection, rad
 """
 
 from beaver_ftc.aircraft import ROLL, YAW

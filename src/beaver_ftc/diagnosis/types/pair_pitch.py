@@ -11,9 +11,11 @@ In any other case the plane of pitch stays open.
 
     types           record of `fault_types_dtype`
     layout          gives the group of a surface and the other surface in it (partner)
-    srf1, srf2      surfaces of the first and of the second fault
-
-Other symbols: verdict.py, remaining.py, types/__init__.py.
+    s, srf          surface, and its record (records.py); 1, 2: of the first and of the second fault
+    est             estimators of the isolation; eff: effect of the fault of one of them
+    nu, nu_max      (3,) rad/s2: innovation, and its bound without a fault
+    lo, hi          interval of a deflection, rad
+    sole            the only type that remains
 """
 
 import numpy as np

@@ -6,8 +6,8 @@ Elevator and flap move pitch alone, ailerons and rudder roll and yaw alone: each
     types           record of `fault_types_dtype`
     past            record of `conclusion_dtype`, of the frame before
     bank            detection filters
-
-Other symbols: verdict.py, remaining.py, types/__init__.py.
+    est             estimators of the isolation; nu_max: bound on the innovation without a fault, rad/s2
+    s, srf, t       surface, and its record (records.py); time, s
 """
 
 import numpy as np

@@ -22,13 +22,14 @@ than
 surface may already have been returning after a repair. So its set before the earliest return still possible
 is kept, and is restored when the surface looks healthy.
 
+    srf, h      record of a surface (records.py), number of a type
     b           slot of releases, EARLIER or LATER
     rel         record of the releases (records.RELEASE_RECORD)
     lo, hi      rad, interval of positions: where a type holds the surface, or where returns begin in a frame
     low, high   rad, means over the frame of the returns that begin at lo and at hi
 
 In a frame, examination.judge_frame calls `begin_release`, then `held_set` if the frame is judged, then
-`advance_returns`. Other symbols: types/__init__.py.
+`advance_returns`.
 """
 
 import numpy as np

@@ -11,8 +11,10 @@ No type is named here: the columns of the table (`FaultType`) say what distingui
     kind        a type, TYPE_UNDECIDED or NO_TYPE
     mask        types, (N_TYPES,) bool
 
-In has_shown(h, srf, h) the first h selects the kernel of the type, and the second is its argument. Other
-symbols: types/__init__.py.
+    srf, h      record of a surface (records.py), number of a type
+    c           configuration of the types (TYPES_CONFIG_RECORD)
+
+In has_shown(h, srf, h) the first h selects the kernel of the type, and the second is its argument.
 """
 
 from beaver_ftc.compiled import kernel

@@ -8,8 +8,8 @@ chooses what the law does, and findings.py puts the finding in words.
     layout      record of `layout.layout_dtype`
     finding     four values: an estimator, NOT_ISOLATED or UNANTICIPATED; the time of its isolation, s; the
                 kind; the time since which the fault is of this kind, s
-
-Other symbols: remaining.py, types/__init__.py.
+    kind        a type, TYPE_UNDECIDED or NO_TYPE (remaining.py)
+    s, srf, t   surface, and its record (records.py); time, s
 """
 
 from beaver_ftc.aircraft import PITCH

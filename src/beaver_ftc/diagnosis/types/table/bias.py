@@ -1,7 +1,10 @@
 """Bias: p = u + b, cut off by the stops; the offset b, rad, is constant.
 
-Symbols: types/__init__.py. `consistent_interval` reads the judged frame (srf.judged, srf.commands[1]),
-`deflection_range` the elapsed one (srf.last, srf.commands[0]). With blocks, each is a block of frames.
+`consistent_interval` reads the judged frame (srf.judged, srf.commands[1]), `deflection_range` the elapsed one
+(srf.last, srf.commands[0]). With blocks, each is a block of frames.
+
+    c, srf, h, k    configuration of the types, record of a surface, number of a type, judged frame
+    u, p            deflection, rad: of a healthy surface under the same command, of this one
 """
 
 import numpy as np

@@ -5,8 +5,12 @@ offset that grows almost as fast as a runaway counts as one. The memory therefor
 interval (b_lo, b_hi) of an offset that is slower than a runaway: it widens in every frame (`see_frame`), and
 each judged frame narrows it (`narrow_slow_offset`).
 
-Symbols: types/__init__.py. `consistent_interval` reads the judged frame (srf.judged, srf.commands[1]). With
-blocks, it is a block of frames.
+`consistent_interval` reads the judged frame, or block of frames (srf.judged, srf.commands[1]).
+
+    c, srf, h, k    configuration of the types, record of a surface, number of a type, judged frame
+    u, p            deflection, rad: of a healthy surface under the same command, of this one
+    lo, hi          interval of b in a judged frame, rad
+    M               memory of the type: its `memory_dtype` below
 """
 
 import numpy as np

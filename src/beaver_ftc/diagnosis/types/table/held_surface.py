@@ -6,8 +6,10 @@
                of a runaway takes it
 
 The three share one way of being judged: a row says where its type holds the surface (`deflection_range`), and
-release.py tests whether the judged frame agrees with this, or with a return after a release. Symbols:
-types/__init__.py.
+release.py tests whether the judged frame agrees with this, or with a return after a release.
+
+    c, srf, h, k    configuration of the types, record of a surface, number of a type, judged frame
+    u, p            deflection, rad: of a healthy surface under the same command, of this one
 """
 
 import numpy as np

@@ -1,7 +1,10 @@
 """Loss of effectiveness: p = (1 + theta) u, with 1 + theta in [0, 1], the effectiveness.
 
 Two types: 1 + theta is constant, or (incipient) any in every frame. The kernels of the second begin with
-`varying`. Symbols: types/__init__.py.
+`varying`.
+
+    c, srf, h, k    configuration of the types, record of a surface, number of a type, judged frame
+    u, p            deflection, rad: of a healthy surface under the same command, of this one
 """
 
 import numpy as np

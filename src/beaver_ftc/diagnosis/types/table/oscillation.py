@@ -2,7 +2,12 @@
 
 Counting half-cycles above a level that noise cannot reach is how oscillatory failures are monitored in
 service [Goupil2010]. `see_frame` and `consistent_interval` read the judged frame, or block of frames
-(srf.judged). Symbols: types/__init__.py.
+(srf.judged).
+
+    c, srf, h, k    configuration of the types, record of a surface, number of a type, judged frame
+    u, p            deflection, rad: of a healthy surface under the same command, of this one
+    lo, hi          interval of p - u in the judged frame, rad
+    M               memory of the type: its `memory_dtype` below
 """
 
 from math import pi, sqrt

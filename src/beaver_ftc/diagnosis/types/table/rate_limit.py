@@ -2,7 +2,11 @@
 
 A slower surface counts as stuck: the two types are each other's limit, and only a least rate distinguishes
 them. `consistent_interval` reads the judged frame, or block of frames (srf.judged), and the commands of it
-and of the one before (srf.commands). Symbols: types/__init__.py.
+and of the one before (srf.commands).
+
+    c, srf, h, k    configuration of the types, record of a surface, number of a type, judged frame
+    u, p            deflection, rad: of a healthy surface under the same command, of this one
+    M               memory of the type: its `memory_dtype` below
 """
 
 from beaver_ftc.compiled import kernel, record
@@ -74,8 +78,8 @@ def commands_of_frame(c, srf):
     otherwise the commands of both frames (2 and 1) have.
     """
     cmd = srf.commands
-    b = 2 if c.single_instant else 1
-    return min(cmd.cmd_min[2], cmd.cmd_min[b]), max(cmd.cmd_max[2], cmd.cmd_max[b])
+    last = 2 if c.single_instant else 1
+    return min(cmd.cmd_min[2], cmd.cmd_min[last]), max(cmd.cmd_max[2], cmd.cmd_max[last])
 
 
 @kernel

@@ -18,7 +18,7 @@ def new(**legs):
         c = {"altitude": ALTITUDE, "speed": SPEED, "heading": HEADING, "bank": BANK}[name]
         pilot["n_legs"][c] = len(given)
         for j, (at_s, value, speed) in enumerate(given):
-            pilot["leg_starts_at_s"][c, j], pilot["leg_value"][c, j], pilot["leg_max_command_rate"][c, j] = (
+            pilot["leg_starts_at_s"][c, j], pilot["leg_value"][c, j], pilot["leg_max_rate"][c, j] = (
                 at_s,
                 value,
                 speed,

@@ -202,7 +202,7 @@ def test_the_design_follows_the_servos_that_the_designer_knows():
         "CY_beta": "fdi.statistical.gust.memory.table.value",
         "CY_dr": "fdi.statistical.forces.component.0.G_trim",
         "CX_dpt": "autopilot.thrust", "Cl_beta": "autopilot.dihedral",
-        "Cn_beta": "autopilot.dpt_cubed_held_by_sideslip", "Cn_dr": "control.power.config.highest_dpt",
+        "Cn_beta": "autopilot.sideslip_dpt_cubed", "Cn_dr": "control.power.config.highest_dpt",
         "Cl_da_left": "control.layout.authority",
     }.items(),
 )  # fmt: skip

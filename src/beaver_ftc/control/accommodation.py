@@ -142,7 +142,7 @@ def accommodate(control, assessment, faults, prediction, measured):
     """Bring the estimates of all surfaces and of the unknown acceleration to this frame
     (control.CompiledLaw)."""
     surfaces = control.surfaces
-    output = control.surfaces.output
+    output = surfaces.output
     informed = control.config.informed
     begin_frame(output, assessment.lags and not informed)
     if informed:

@@ -99,7 +99,7 @@ def take_over(ap, y, attitude):
 def forget_losses(autopilot: np.void) -> None:
     """Forget which surfaces are lost, the integrals that follow from the losses, and the airspeeds that can
     be held with them: a law that takes over from an oracle must not receive the truth."""
-    for share in ("roll_loss_share", "yaw_loss_share", "engines_alone_yaw_share"):
+    for share in ("roll_loss_share", "yaw_loss_share", "engine_yaw_share"):
         autopilot[share] = 0.0
     autopilot["missing_roll_rate"] = autopilot["missing_turn_rate"] = 0.0
     for field in ("n_averaged_frames", "limits_airspeed", "mean_acting_elevator", "mean_commanded_elevator"):
@@ -118,7 +118,7 @@ def smooth_signals_and_losses(ap, layout, surfaces, saturated, engines_yaw, y):
         roll_loss_share            1 if less than `least` of roll remains, or the       jammed_s
                                    main surface of roll is at its stop
         yaw_loss_share             1 if less than `least` of yaw remains                jammed_s
-        engines_alone_yaw_share    1 if yaw is lost or its main surface at its stop     BY_POWER_S
+        engine_yaw_share           1 if yaw is lost or its main surface at its stop     BY_POWER_S
 
     At its stop a surface gives no more, whatever its estimated effectiveness. engines_yaw: whether engines
     can yaw the aircraft; the last share stays if not.
@@ -138,7 +138,7 @@ def smooth_signals_and_losses(ap, layout, surfaces, saturated, engines_yaw, y):
     ap.yaw_loss_share += dt / gain.jammed_s * (yaw_lost - ap.yaw_loss_share)
     if engines_yaw:
         by_power = yaw_lost or saturated[main[YAW]] == 1
-        ap.engines_alone_yaw_share += dt / BY_POWER_S * (by_power - ap.engines_alone_yaw_share)
+        ap.engine_yaw_share += dt / BY_POWER_S * (by_power - ap.engine_yaw_share)
 
 
 @kernel

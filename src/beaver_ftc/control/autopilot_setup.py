@@ -43,7 +43,7 @@ AUTOPILOT = record(
     # Profile (profile.py), in SI and rad, by channel: its legs. A leg whose value is NaN keeps the command.
     n_legs=(int, N_CHANNELS), next_leg_index=(int, N_CHANNELS),
     leg_starts_at_s=(N_CHANNELS, MAX_LEGS), leg_value=(N_CHANNELS, MAX_LEGS),
-    leg_max_command_rate=(N_CHANNELS, MAX_LEGS),
+    leg_max_rate=(N_CHANNELS, MAX_LEGS),
     is_commanded=(int, N_CHANNELS),  # whether a leg has begun, so that the channel is flown
     # the value to which the leg takes the command; the command now; its largest rate, per second
     goal=N_CHANNELS, command=N_CHANNELS, max_command_rate=N_CHANNELS,
@@ -58,7 +58,7 @@ AUTOPILOT = record(
     climb_in_trim=float,  # gamma_trim, rad, with the engine as trimmed
     dihedral=float,  # 1/m: minus roll rate per rad of sideslip and m/s of airspeed
     full_power=float, allowed_power=float,  # the highest setting now; the highest that the rudder allows
-    dpt_cubed_held_by_sideslip=float,  # dpt^3 whose yawing moment the largest accepted sideslip holds
+    sideslip_dpt_cubed=float,  # dpt^3 whose yawing moment the largest accepted sideslip holds
     slowest_mps=float, steepest_alpha=float,  # least airspeed, m/s, and largest angle of attack, rad, to fly
     max_healthy_rate=3, rate_limit=3,  # largest p, q, r to demand, rad/s: with all surfaces healthy, and now
     max_healthy_bank=float, bank_limit=float,  # largest bank to demand, rad: the same
@@ -69,18 +69,18 @@ AUTOPILOT = record(
     missing_turn_rate=float, missing_path_angle=float, missing_acceleration=float, missing_roll_rate=float,
     roll_loss_share=float,  # share of roll that rudder and dihedral carry, 0 to 1
     yaw_loss_share=float,  # 1: no surface acts in yaw; moves smoothly between 0 and 1
-    engines_alone_yaw_share=float,  # share of the last BY_POWER_S in which engines alone act in yaw
+    engine_yaw_share=float,  # share of the last BY_POWER_S in which engines alone act in yaw
     # Output
     rates=3,  # p, q, r to fly, rad/s
     sets_power=int, power_setting=float,  # whether the autopilot sets the engine now, and to what
     power_airspeed=float,  # m/s, to hold while power stands in for a lost pitch
-    airspeed_to_fly=float, airspeed_to_fly_rate=float,  # m/s; its rate of change, m/s2
+    airspeed_to_fly=float, to_fly_rate=float,  # m/s; its rate of change, m/s2
     holding=HOLDING,
     # Deviations: averaged over MEAN_S, and the largest so far; from the command and, for the airspeed, also
     # from the airspeed to fly. `largest_deviation` is NOT_JUDGED until the channel counts (profile.py).
-    mean_deviation=N_CHANNELS, mean_deviation_from_airspeed_to_fly=float,
-    largest_deviation_from_airspeed_to_fly=float, largest_deviation=N_CHANNELS,
-    largest_instant_airspeed_deviation=float,  # m/s, of the airspeed from what is commanded, at one instant
+    mean_deviation=N_CHANNELS, mean_limited_deviation=float,
+    largest_limited_deviation=float, largest_deviation=N_CHANNELS,
+    largest_instant_deviation=float,  # m/s, of the airspeed from what is commanded, at one instant
 )  # fmt: skip
 
 MOST_DEG_S = (12.0, 6.0, 10.0)  # largest rates p, q, r of a healthy aircraft: a transport's manoeuvres
@@ -157,6 +157,6 @@ def _set_up_aircraft_values(autopilot: np.void, declared: Declared) -> None:
         autopilot, pitch_holds_airspeed=aircraft.airspeed_by == "pitch",
         thrust=S_per_m * np.array([terms.get(THRUST_TERM, 0.0), terms.get("CX_adpt2", 0.0)]),
         dihedral=max(roll_ratio, LEAST_DIHEDRAL) * 2.0 / aircraft.geometry.span_m,
-        dpt_cubed_held_by_sideslip=dpt3,
+        sideslip_dpt_cubed=dpt3,
         slowest_mps=slowest + min(SPARE_MPS, SPARE_SHARE * (fastest - slowest)),
     )  # fmt: skip

@@ -159,11 +159,11 @@ def approach_airspeed_to_fly(ap):
     target = min(max(command, holding.slowest), holding.fastest)
     if target == command and not holding.limits_airspeed:
         ap.airspeed_to_fly = command
-        ap.airspeed_to_fly_rate = ap.command_rate[SPEED]
+        ap.to_fly_rate = ap.command_rate[SPEED]
         return
     step = clamp(target - ap.airspeed_to_fly, holding.max_airspeed_rate_mps2 * ap.dt)
     ap.airspeed_to_fly += step
-    ap.airspeed_to_fly_rate = step / ap.dt
+    ap.to_fly_rate = step / ap.dt
     holding.limits_airspeed = ap.airspeed_to_fly != command
 
 

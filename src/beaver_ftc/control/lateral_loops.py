@@ -19,7 +19,7 @@ LOOP_GAIN_SHARE_BY_POWER = 0.25  # factor on both loops where engines alone yaw 
 def bank_angle_rate(ap, attitude):
     """phi_c' = share K (phi_c - phi) + roll_loss M, the rate of the bank angle, rad/s:
 
-        share = 1 - roll_loss engines_alone_yaw_share (1 - LOOP_GAIN_SHARE_BY_POWER)
+        share = 1 - roll_loss engine_yaw_share (1 - LOOP_GAIN_SHARE_BY_POWER)
         M <- M + roll_loss dt share K_i (phi_c - phi)        unless limited
 
     The loop is slower where engines alone yaw and roll the aircraft. phi_c is within bank_limit. If neither
@@ -27,7 +27,7 @@ def bank_angle_rate(ap, attitude):
     """
     gain = ap.gain
     roll_loss = ap.roll_loss_share
-    share = 1.0 - roll_loss * ap.engines_alone_yaw_share * (1.0 - LOOP_GAIN_SHARE_BY_POWER)
+    share = 1.0 - roll_loss * ap.engine_yaw_share * (1.0 - LOOP_GAIN_SHARE_BY_POWER)
     if ap.is_commanded[HEADING]:
         bank = bank_to_turn(ap, share, attitude[YAW])
     elif ap.is_commanded[BANK]:

@@ -51,7 +51,7 @@ def begin_leg(autopilot, c, measured, t):
         change = value - autopilot.command[c]
         autopilot.goal[c] += wrapped(change) if c == HEADING else change
         autopilot.changed_at_s[c] = t
-    autopilot.max_command_rate[c] = autopilot.leg_max_command_rate[c, j]
+    autopilot.max_command_rate[c] = autopilot.leg_max_rate[c, j]
 
 
 @kernel
@@ -99,15 +99,11 @@ def record_deviations(autopilot, altitude_m, airspeed_mps, heading, bank, t):
 def record_airspeed_deviations(autopilot, airspeed_mps, deviation):
     """Update two more largest deviations of the airspeed: from the command at one instant (deviation, m/s),
     and of the mean over MEAN_S from the airspeed to fly."""
-    autopilot.largest_instant_airspeed_deviation = max(
-        autopilot.largest_instant_airspeed_deviation, abs(deviation)
-    )
-    mean = autopilot.mean_deviation_from_airspeed_to_fly
+    autopilot.largest_instant_deviation = max(autopilot.largest_instant_deviation, abs(deviation))
+    mean = autopilot.mean_limited_deviation
     mean += autopilot.dt / MEAN_S * (airspeed_mps - autopilot.airspeed_to_fly - mean)
-    autopilot.mean_deviation_from_airspeed_to_fly = mean
-    autopilot.largest_deviation_from_airspeed_to_fly = max(
-        autopilot.largest_deviation_from_airspeed_to_fly, abs(mean)
-    )
+    autopilot.mean_limited_deviation = mean
+    autopilot.largest_limited_deviation = max(autopilot.largest_limited_deviation, abs(mean))
 
 
 def set_up_profile(autopilot: np.void, declared: Declared) -> None:
@@ -119,4 +115,4 @@ def set_up_profile(autopilot: np.void, declared: Declared) -> None:
             autopilot["leg_starts_at_s"][c, j] = leg.at_s
             autopilot["leg_value"][c, j] = nan if leg.value is None else leg.value * unit
             rate = getattr(leg, "climb_mps", getattr(leg, "change_mps2", inf))
-            autopilot["leg_max_command_rate"][c, j] = rate
+            autopilot["leg_max_rate"][c, j] = rate

@@ -53,12 +53,12 @@ def set_highest_power(ap, power, at_stop, E, y):
         P <- P + RAISE_INHG_S dt                                  otherwise
         full_power = min(P, P(E highest_dpt^3 + (1 - E) sideslip)) if E < 1, else P
 
-    sideslip: dpt_cubed_held_by_sideslip. P(dpt^3): `ceiling`, the power whose propeller has this slipstream.
+    sideslip: sideslip_dpt_cubed. P(dpt^3): `ceiling`, the power whose propeller has this slipstream.
     The propeller of the Beaver yaws the aircraft with dpt^3, and what the rudder lacks, sideslip makes up
     for. At its stop the rudder can hold no more of this moment, whatever its estimated effectiveness. The
     slower the flight, the lower is full_power: a climb with more power would end in slow flight.
     """
-    sideslip = ap.dpt_cubed_held_by_sideslip
+    sideslip = ap.sideslip_dpt_cubed
     if at_stop:
         cut = min(ap.allowed_power, power.output.command[0]) - CUT_INHG_S * ap.dt
         P = max(cut, ceiling(power, y, sideslip ** (1.0 / 3.0)))
@@ -104,7 +104,7 @@ def glide_path_angle(ap):
     gamma_c = gamma_trim - (V_c' + K (V_c - V) + M) / g
     """
     error = ap.airspeed_to_fly - ap.airspeed
-    demand = (ap.airspeed_to_fly_rate + ap.missing_acceleration + ap.gain.speed * error) / ap.gravity
+    demand = (ap.to_fly_rate + ap.missing_acceleration + ap.gain.speed * error) / ap.gravity
     limited = clamp(demand, MOST_PATH_RAD)
     if limited == demand:
         integrate_missing_acceleration(ap, error)
@@ -177,7 +177,7 @@ def set_power(ap, power, y, path, push):
     V_c = ap.airspeed_to_fly
     recent = ap.recent_airspeed_mps
     error = V_c - V
-    A = ap.airspeed_to_fly_rate + ap.missing_acceleration
+    A = ap.to_fly_rate + ap.missing_acceleration
     if power.memory.engaged:
         ap.power_airspeed = recent + clamp(V_c - recent, MAX_FROM_RECENT_MPS)
         error = ap.power_airspeed - V
@@ -186,7 +186,7 @@ def set_power(ap, power, y, path, push):
     A += ap.gravity * (path - ap.climb_in_trim)
     demand = power_for(ap.engine, push, ap.trim_power, A)
     high = min(ap.full_power, ceiling(power, y, power.config.highest_dpt))
-    room = KEPT_ASIDE * ap.engines_alone_yaw_share * (ap.high_power - ap.low_power)
+    room = KEPT_ASIDE * ap.engine_yaw_share * (ap.high_power - ap.low_power)
     limited = max(min(demand, high - room), ap.low_power + room)
     if limited == demand:
         integrate_missing_acceleration(ap, error)

@@ -208,8 +208,8 @@ def _profile(frame: np.void) -> dict[str, float | None] | None:
     judged = {name: None if away == NOT_JUDGED else away for name, away in off.items()}
     flown = autopilot["is_commanded"][SPEED]
     for name, record in (
-        (LIMITED, "largest_deviation_from_airspeed_to_fly"),
-        (AT_ONE_INSTANT, "largest_instant_airspeed_deviation"),
+        (LIMITED, "largest_limited_deviation"),
+        (AT_ONE_INSTANT, "largest_instant_deviation"),
     ):
         judged[name] = float(autopilot[record]) if flown else None
     return judged

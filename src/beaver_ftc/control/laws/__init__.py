@@ -87,7 +87,6 @@ def complete(control, assessment, measured, t):
     of the truth. power_stage: the common lever; engine_stage: the engines that are effectors.
     """
     out = control.allocation.output
-    surfaces = control.surfaces
     axes = control.axes
     layout = control.layout
     power_stage = control.power
@@ -95,9 +94,9 @@ def complete(control, assessment, measured, t):
     config = engine_stage.config
     output = engine_stage.output
     engines_serve = assessment.detected or control.config.informed
-    authority.note_shortfall(axes, out.command, layout, surfaces.output.lag, output.authority)
+    authority.note_shortfall(axes, out.command, layout, control.surfaces.output.lag, output.authority)
     if power_stage.config.enabled:
-        lost = power.pitch_is_lost(layout, surfaces, out.saturated, axes.shortfall)
+        lost = power.pitch_is_lost(layout, control.surfaces, out.saturated, axes.shortfall)
         power.steer_by_power(power_stage, control.reference, measured.x, measured.y, engines_serve, lost, t)
     if config.n > 0:
         if engines_serve:

@@ -46,7 +46,8 @@ onset tests; a digit at the end of g or S is an axis.
     g              whitened response, rad/s: to nu; g_Z to a regressor, g_c to a coarse gust, g_s to s
     x              state of a filter, in the same way: x_Z, x_c, x_s; of two axes first the rates, from D0 on
                    the drift
-    K_x, K_d, S    gains of the filter on rate and drift, 1/s; covariance of g, rad2/s2 (S_inv: its inverse)
+    K_x, K_d       gains of the filter: on the rate, without unit, and on the drift, 1/s
+    S, S_inv       covariance of g, rad2/s2, and its inverse
     a              decay of the drift in a frame
     s, w           signature since the onset, rad/s2; S^-1 g_s, s/rad
     N, D           sums as above; N_p, N_c: shares of N by p and by a coarse gust

@@ -25,7 +25,8 @@ Letters of the kernels:
     j, k              regressor, frequency
     N, R              sums as above, (N_TONES,) and (n_Z, N_TONES) complex
     g, g_Z            whitened innovation, and responses to the regressors, rad/s; 1 / S is S_inv of the block
-    K_x, K_d, a       gains of the block's filter, 1/s, and decay of its drift; a of c: decay in an update
+    K_x, K_d, a       gains of the block's filter on rate, 1, and drift, 1/s, and decay of its drift; a of c:
+                      decay in an update
     z, rho            exp(i omega dt); exp((i omega - 1 / T) dt) of an update; rho2: of 2 omega
     e_R, eta          the most that coefficients, and the bounded uncertainty, add to |N|
 """

@@ -38,11 +38,12 @@ its fault may be refuted, so it is not isolated; *pending*, a test has refuted t
 waits for the sensor monitor; *confirmed*, its loss has been proved by likelihood.
 """
 
+from collections.abc import Sequence
 from math import exp
 
 import numpy as np
 
-from beaver_ftc.aircraft import PITCH, Aircraft
+from beaver_ftc.aircraft import PITCH, Aircraft, main_surface_index_by_axis
 from beaver_ftc.compiled import fill, kernel, record, sized
 from beaver_ftc.diagnosis.conclusion import NOT_ISOLATED, UNANTICIPATED
 from beaver_ftc.diagnosis.detection import parity, statistical
@@ -61,9 +62,21 @@ from beaver_ftc.diagnosis.estimators import (
 from beaver_ftc.diagnosis.sets import explain
 from beaver_ftc.scenario.declared import Declared
 
+PITCH_GROUP, LATERAL_GROUP = 0, 1  # groups of surfaces
 # Rounds of `widen_error`. Each one multiplies the distance of u from its limit by eG / |Z|, the relative
 # error of the surface's effect.
 N_ROUNDS = 4
+
+
+@sized
+def layout_dtype(n: int) -> np.dtype:
+    """Layout of n surfaces. By surface: its dominant axis; its group (PITCH_GROUP or LATERAL_GROUP); its
+    partner, the other surface of a group of two in the aircraft's file, or -1; the numbers of the estimators
+    of its loss and of its position, or -1. By axis: the main surface."""
+    return record(
+        dominant_axis=(int, n), group=(int, n), partner=(int, n), main=(int, 3), loss=(int, n),
+        position=(int, n),
+    )  # fmt: skip
 
 
 @sized
@@ -115,6 +128,23 @@ def list_estimators(fault_class: str, aircraft: Aircraft) -> tuple[EstimatorEntr
 def estimator_names(fault_class: str, aircraft: Aircraft) -> tuple[str, ...]:
     """Names of the isolation estimators of a fault class, in the bank's order."""
     return tuple(name for name, _, _ in list_estimators(fault_class, aircraft))
+
+
+def configure_layout(layout: np.void, rows: Sequence[tuple[str, int, int]], aircraft: Aircraft) -> None:
+    """Fill in axes, groups and estimators of the surfaces; rows: (name, kind of hypothesis, surface) of each
+    estimator."""
+    index = {name: k for k, name in enumerate(aircraft.surfaces)}
+    groups = [PITCH_GROUP if axis == PITCH else LATERAL_GROUP for axis in aircraft.dominant_axis]
+    fill(
+        layout, main=main_surface_index_by_axis(aircraft), dominant_axis=aircraft.dominant_axis,
+        group=groups, partner=-1, loss=-1, position=-1,
+    )  # fmt: skip
+    for names in aircraft.groups.values():
+        if len(names) == 2:
+            a, b = (index[name] for name in names)
+            layout["partner"][[a, b]] = b, a
+    for j, (_, kind, s) in enumerate(rows):
+        layout["loss" if kind == LOSS else "position"][s] = j
 
 
 def configure_isolation(

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.compiled import apart, fill, kernel, record, sized
-from beaver_ftc.diagnosis import bounds_design, conclusion, isolation, layout
+from beaver_ftc.diagnosis import bounds_design, conclusion, isolation
 from beaver_ftc.diagnosis.assessment import weighs_statistics
 from beaver_ftc.diagnosis.bounds import bound_dtype
 from beaver_ftc.diagnosis.config import (
@@ -45,7 +45,7 @@ def fdi_dtype(n: int, size: StatisticalSize = USUAL_SIZE) -> np.dtype:
     statistical detector's record."""
     return record(
         config=SHARED_CONFIG_RECORD, bound=bound_dtype(n, size.n_map_boxes), bank=filters.BANK_RECORD,
-        fdae=fdae.FDAE_RECORD, verdict=conclusion.conclusion_dtype(n), layout=layout.layout_dtype(n),
+        fdae=fdae.FDAE_RECORD, verdict=conclusion.conclusion_dtype(n), layout=isolation.layout_dtype(n),
         isolation=isolation.isolation_dtype(n), types=records.fault_types_dtype(n),
         statistical=statistical.statistical_dtype(size), sensor_monitor=SENSOR_MONITOR_RECORD,
         published=zhang2005.PUBLISHED_RECORD, engine_monitor=engine_monitor.ENGINE_MONITOR_RECORD,
@@ -64,7 +64,7 @@ def configure_diagnosis(fdi: np.void, pred: np.void, declared: Declared, travel:
     dt = 1.0 / declared.rate_hz
     rows = isolation.list_estimators(config.fault_class, aircraft)
     configure_shared(fdi["config"], declared)
-    layout.configure_layout(fdi["layout"], rows, aircraft)
+    isolation.configure_layout(fdi["layout"], rows, aircraft)
     isolation.configure_isolation(fdi["isolation"], declared, rows, travel)
     if config.pairs and (refusal := pairs_refused(declared.sensors.declared, aircraft)):
         raise BadInput(f"{declared.name}: fdi.pairs: {refusal}, allowed: false")

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.diagnosis.conclusion import NOT_ISOLATED, UNANTICIPATED
-from beaver_ftc.diagnosis.layout import PITCH_GROUP
+from beaver_ftc.diagnosis.isolation import PITCH_GROUP
 from beaver_ftc.diagnosis.types import GIVE_UP, SCALE_COMMAND, registry
 from beaver_ftc.diagnosis.types.registry import CAN_LOOK_LIKE, CONSTANT, MODE, N_CONSTANT
 from beaver_ftc.diagnosis.types.verdict import BY_ESTIMATOR, DEDUCED_FAULTY

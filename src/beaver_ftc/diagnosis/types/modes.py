@@ -7,7 +7,7 @@ presumed    the surface that the law acts on while none is isolated
 lead        the surface, and its mode, that the supervisor of the law follows (control/accommodation.py)
 silent      a fault with whose deflection error the last frame does not agree
 
-types       record of `fault_types_dtype`; layout: of `layout.layout_dtype`
+types       record of `fault_types_dtype`; layout: of `isolation.layout_dtype`
 s, srf      surface, and its record (records.py)
 kind        a type, TYPE_UNDECIDED or NO_TYPE (remaining.py)
 sole        the only surface, or type, that remains
@@ -17,7 +17,7 @@ import numpy as np
 
 from beaver_ftc.aircraft import PITCH
 from beaver_ftc.compiled import kernel
-from beaver_ftc.diagnosis.layout import PITCH_GROUP
+from beaver_ftc.diagnosis.isolation import PITCH_GROUP
 from beaver_ftc.diagnosis.types import (
     GIVE_UP,
     SCALE_COMMAND,

@@ -15,7 +15,7 @@ remains on each.
 
 from beaver_ftc.aircraft import ROLL, YAW
 from beaver_ftc.compiled import kernel
-from beaver_ftc.diagnosis.layout import LATERAL_GROUP
+from beaver_ftc.diagnosis.isolation import LATERAL_GROUP
 from beaver_ftc.diagnosis.types.observations import observe_error
 from beaver_ftc.diagnosis.types.registry import ALL
 from beaver_ftc.diagnosis.types.remaining import any_remains, explains_flight, type_on_surface

@@ -22,7 +22,7 @@ import numpy as np
 
 from beaver_ftc.aircraft import PITCH
 from beaver_ftc.compiled import kernel
-from beaver_ftc.diagnosis.layout import PITCH_GROUP
+from beaver_ftc.diagnosis.isolation import PITCH_GROUP
 from beaver_ftc.diagnosis.types import GIVE_UP, examination, remaining
 from beaver_ftc.diagnosis.types.observations import forget_anomalies, last_error, observe_error, set_anomalous
 from beaver_ftc.diagnosis.types.registry import ALL, CONSTANT, MODE, N_CONSTANT, N_TYPES, deflection_range

@@ -16,7 +16,7 @@ from beaver_ftc.aircraft import PITCH
 from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis.conclusion import UNANTICIPATED
 from beaver_ftc.diagnosis.detection.filters import leaves_bound
-from beaver_ftc.diagnosis.layout import LATERAL_GROUP, PITCH_GROUP
+from beaver_ftc.diagnosis.isolation import LATERAL_GROUP, PITCH_GROUP
 from beaver_ftc.diagnosis.types import examination, verdict
 from beaver_ftc.diagnosis.types.pair_lateral import isolate_lateral, locate_lateral
 from beaver_ftc.diagnosis.types.pair_pitch import isolate_pitch, observe_pitch

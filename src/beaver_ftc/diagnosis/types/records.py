@@ -12,7 +12,7 @@ from math import ceil, pi, radians
 import numpy as np
 
 from beaver_ftc.compiled import fill, record, sized
-from beaver_ftc.diagnosis.layout import PITCH_GROUP
+from beaver_ftc.diagnosis.isolation import PITCH_GROUP
 from beaver_ftc.diagnosis.model_prediction import DEFAULT_RATE_RAD_S, servo_data
 from beaver_ftc.diagnosis.types.observations import OBSERVATION_RECORD
 from beaver_ftc.diagnosis.types.registry import N_TYPES, TYPES

@@ -5,7 +5,7 @@ chooses what the law does, and findings.py puts the finding in words.
 
     types       record of `fault_types_dtype`
     past        record of `conclusion_dtype`, of the frame before
-    layout      record of `layout.layout_dtype`
+    layout      record of `isolation.layout_dtype`
     finding     four values: an estimator, NOT_ISOLATED or UNANTICIPATED; the time of its isolation, s; the
                 kind; the time since which the fault is of this kind, s
     kind        a type, TYPE_UNDECIDED or NO_TYPE (remaining.py)

@@ -4,11 +4,9 @@ A block with faults is flown for each fault of the grid, and again for each sche
 nominal law reads no verdict, so that all schemes diagnose the same flights.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 
@@ -43,16 +41,15 @@ FLOWN_THEMSELVES = BUILT_IN | {"zhang2005": {"scheme": "zhang2005"}}
 
 
 def scenario_of(
-    block: Block,
-    duration_s: float,
-    faults: Sequence[Document] = (),
-    where: Mapping[str, Any] = MappingProxyType({}),
+    block: Block, duration_s: float, faults: Sequence[Document] = (), where: Document | None = None
 ) -> Scenario:
-    """A flight of a block. Everything in it follows from the block, except duration, faults and `where`.
+    """A flight of a block. Everything in it follows from the block, except duration, faults and the keys of
+    `where`.
 
     Model errors are added to the Beaver alone: another aircraft has the error of its own model.
     """
     sensors, turbulence = block.condition
+    where = where or {}
     aircraft = where.get("aircraft", DEFAULT)
     find_aircraft(aircraft, Path())  # each process registers a folder in the working directory
     return Scenario.model_validate(
@@ -95,17 +92,16 @@ def _uncertainty(block: Block) -> Document:
     }
 
 
-def contenders(names: list[str] | None = None) -> tuple[str, ...]:
-    """The schemes to compare: ours, then those named, or all that can be compared. Raises BadInput with a
-    line for each wrong name."""
+def contenders(names: list[str] | None) -> tuple[str, ...]:
+    """The schemes to compare: ours, then those with these names; None: all that can be compared. Raises
+    BadInput with a line for each wrong name."""
     if names is None:
-        known_names = registered(DETECTORS)
-        names = [name for name in known_names if name in FLOWN_THEMSELVES or not is_compiled(DETECTORS, name)]
-    names = list(dict.fromkeys([*BUILT_IN, *names]))
-    mistakes = [f"--schemes: {mistake}" for name in names if (mistake := _refusal(name)) is not None]
+        names = [name for name in registered(DETECTORS) if _refusal(name) is None]
+    chosen = tuple(dict.fromkeys([*BUILT_IN, *names]))
+    mistakes = [f"--schemes: {mistake}" for name in chosen if (mistake := _refusal(name)) is not None]
     if mistakes:
         raise BadInput("\n".join(mistakes))
-    return tuple(names)
+    return chosen
 
 
 def _refusal(name: str) -> str | None:
@@ -118,21 +114,19 @@ def _refusal(name: str) -> str | None:
     return refusal(DETECTORS, name)
 
 
-def deflections(
-    recording: Recording, surface: str, magnitude: float, within_s: tuple[float, ...]
-) -> list[float]:
-    """The deflection d of a loss of effectiveness in a recorded flight, each of these times after its begin:
-    the size of its effect -magnitude * moment, (frames, 3) rad/s2, in the whitened noise, in standard
-    deviations. A time beyond the end counts as the end."""
+def deflections(recording: Recording, surface: str, magnitude: float) -> list[float]:
+    """The deflection d of a loss of effectiveness in a recorded flight, each of WITHIN_S after its begin: the
+    size of its effect -magnitude * moment, (frames, 3) rad/s2, in the whitened noise, in standard deviations.
+    A time beyond the end counts as the end."""
     frames_with_fault = [
         measured for measured, _ in recording.seen if measured.t_s > recording.fault_at_s + 1e-9
     ]
     if not frames_with_fault:
-        return [0.0] * len(within_s)
+        return [0.0] * len(WITHIN_S)
     place = recording.context.surfaces.index(surface)
     moment = np.array([measured.contribution[:, place] for measured in frames_with_fault])
     d = WhiteningFilter(VaneGust(recording.context).context).deflection_by_frame(-magnitude * moment)
-    frames = [round(s / recording.context.dt_s) for s in within_s]
+    frames = (round(s / recording.context.dt_s) for s in WITHIN_S)
     return [float(d[min(n, len(d)) - 1]) for n in frames]
 
 
@@ -153,22 +147,15 @@ class Watched:
 
 
 def fly_block(case: tuple[Block, bool], grid: Grid, schemes: Sequence[str]) -> Watched:
-    """Every fault of the grid in a block, or the one flight of a block without a fault. case: the block, and
-    whether it has faults."""
+    """Every fault of the grid in a block, or the one flight of a block without a fault, diagnosed by these
+    schemes. case: the block, and whether it has faults. Plug-ins replay the recordings of the last of our
+    schemes, which come first."""
     block, faulted = case
-    if not faulted:
-        healthy = scenario_of(block, grid.healthy_flight_s, where=grid.where)
-        return _watched(Watched(block), [healthy], schemes)
     at_s = strikes_at_s(block)
+    watched = Watched(block, grid.faults if faulted else ())
     flights = [
-        scenario_of(block, at_s + WATCHED_S, [loss(*fault, at_s)], grid.where) for fault in grid.faults
-    ]
-    return _watched(Watched(block, grid.faults), flights, schemes)
-
-
-def _watched(watched: Watched, flights: Sequence[Scenario], schemes: Sequence[str]) -> Watched:
-    """Fill the outcome of a block. Plug-ins replay the recordings of the last of our schemes, which come
-    first."""
+        scenario_of(block, at_s + WATCHED_S, [loss(*fault, at_s)], grid.where) for fault in watched.faults
+    ] or [scenario_of(block, grid.healthy_flight_s, where=grid.where)]
     recorded: list[Recording] = []
     for scheme in schemes:
         try:
@@ -186,8 +173,8 @@ def _watched(watched: Watched, flights: Sequence[Scenario], schemes: Sequence[st
             watched.failures.append(f"{scheme}: {error}")
         except Exception as error:  # a plug-in may raise anything, and the comparison continues
             watched.failures.append(f"{scheme}: {type(error).__name__}: {error}")
-    faulted = zip(recorded, watched.faults, strict=False)  # without faults there are no pairs
-    watched.deflections = [deflections(recording, *fault, WITHIN_S) for recording, fault in faulted]
+    pairs = zip(recorded, watched.faults, strict=False)  # none without faults
+    watched.deflections = [deflections(recording, *fault) for recording, fault in pairs]
     return watched
 
 

@@ -9,18 +9,10 @@ from beaver_ftc.studies.detectability.shown import NAME, table
 from beaver_ftc.studies.present.page import Makers, Page, study_files
 from beaver_ftc.studies.present.tables import bare_percent, percent
 
-NOT_FOUND = (  # key of a number of flights; the end of the sentence about one flight, and about several
-    (
-        "false_alarms",
-        "with a total loss has an alarm before the loss: it counts as not found.",
-        "with a total loss have an alarm before the loss: these count as not found.",
-    ),
-    (
-        "failed",
-        "with a total loss cannot be flown to the end: it counts as not found.",
-        "with a total loss cannot be flown to the end: these count as not found.",
-    ),
-)
+NOT_FOUND = {  # key of a number of flights: why one of them counts as not found, and why several do
+    "false_alarms": ("has an alarm before the loss", "have an alarm before the loss"),
+    "failed": ("cannot be flown to the end", "cannot be flown to the end"),
+}
 
 
 def page_of(document: Document) -> Page:
@@ -61,24 +53,19 @@ def _sentences(document: Document) -> Iterator[str]:
 
 
 def _sizes(document: Document) -> Iterator[str]:
-    """A sentence about the size that is certain, and one about that which a given share of flights find."""
-    certain, frequent, total, surface = (
-        document[key] for key in ("certain", "found", "total_loss", "surface")
-    )
+    """A sentence about the size that is certain, and one about the size that a share of the flights find."""
+    surface, certain, found, total = (document[key] for key in ("surface", "certain", "found", "total_loss"))
     within = f"within {document['within_s']:g} s"
     nothing = f"not even a total loss of {surface}"
-    size = nothing
-    if certain["size"] is not None:
-        size = f"a loss of {percent(certain['size'])} of the effectiveness of {surface} and more"
+    of_it = f"of the effectiveness of {surface}"
+    size = nothing if certain["size"] is None else f"a loss of {percent(certain['size'])} {of_it} and more"
     yield (
         f"Certain to be detected {within}, whatever the declared uncertainty does: {size} (a total loss: in "
         f"{certain['at_total_loss']} of {certain['flights']} flights)."
     )
     size = nothing
-    if frequent["size"] is not None:
-        size = (
-            f"a loss of {percent(frequent['size'])} ({_interval(frequent)}) of the effectiveness of {surface}"
-        )
+    if found["size"] is not None:
+        size = f"a loss of {percent(found['size'])} ({_interval(found)}) {of_it}"
     yield (
         f"Found {within} in {percent(document['share'])} of flights: {size} (a total loss: in "
         f"{percent(total['value'])}, {bare_percent(total['low'])} to {percent(total['high'])}; "
@@ -87,7 +74,7 @@ def _sizes(document: Document) -> Iterator[str]:
 
 
 def _doubts(document: Document) -> Iterator[str]:
-    """Sentences about flights in which the sizes mean less than they seem to."""
+    """Sentences about inconclusive flights, and about those that count as not found."""
     for reason in document["inconclusive"]:
         yield f"Nothing can be concluded in part of these flights: {reason}."
     if document["bound_used"] >= NEAR_THRESHOLD_SHARE:
@@ -96,9 +83,11 @@ def _doubts(document: Document) -> Iterator[str]:
             "loss: the size found then measures the uncertainty that the scenario flies with, not the "
             "diagnosis."
         )
-    for key, of_one, of_several in NOT_FOUND:
+    for key, (of_one, of_several) in NOT_FOUND.items():
         if count := document[key]:
-            yield f"1 flight {of_one}" if count == 1 else f"{count} flights {of_several}"
+            flights, counts = ("1 flight", "it counts") if count == 1 else (f"{count} flights", "these count")
+            reason = of_one if count == 1 else of_several
+            yield f"{flights} with a total loss {reason}: {counts} as not found."
 
 
 def _is_better(variant: Document, document: Document) -> bool:

@@ -142,8 +142,8 @@ def linear_document(analysis: LinearAnalysis) -> Document:
         "altitude_m": analysis.point.altitude_m,
         "modes": {
             mode: {
-                **{name: _mode(modes_of_model[mode]) for name, modes_of_model in analysis.modes.items()},
-                "deviation": {name: deviation[mode] for name, deviation in deviations.items()},
+                **{name: _mode(by_mode[mode]) for name, by_mode in analysis.modes.items()},
+                "deviation": {name: by_mode[mode] for name, by_mode in deviations.items()},
                 "jsbsim_own_deviation": analysis.own_deviation[mode],
             }
             for mode in MODES

@@ -107,20 +107,16 @@ class Flown:
         return np.array([self.log[column.format(axis)] for axis in AXES])
 
     def shares_of(self, estimator: str) -> np.ndarray:
-        """|residual| / threshold on the side of the residual, of an isolation estimator, (3, frames); 0 / 0
-        is 0. All are 0 before the estimator works, and if the scheme has no such estimator."""
+        """|residual| / threshold on the side of the residual, of an isolation estimator, (3, frames). All are
+        0 before the estimator works, and if the scheme has no such estimator."""
         residual, lower, upper = (
             self.of_axes(f"fie_{estimator}_{{}}_{signal}_rad_s") for signal in ("residual", "lower", "upper")
         )
-        with np.errstate(divide="ignore", invalid="ignore"):
-            ratio = np.abs(residual / np.where(residual < 0, lower, upper))
-        return np.nan_to_num(np.where(residual == 0, 0.0, ratio), posinf=np.inf) * self.has(estimator)
+        return _shares(residual, np.where(residual < 0, lower, upper)) * self.has(estimator)
 
     def shares(self) -> np.ndarray:
-        """|residual| / threshold of the detection estimator, (3, frames); 0 / 0 is 0, as both start from
-        0."""
-        residual, threshold = map(self.of_axes, ("{}_residual_rad_s", "{}_threshold_rad_s"))
-        return np.abs(residual) / np.where(residual == 0, 1.0, threshold)
+        """|residual| / threshold of the detection estimator, (3, frames)."""
+        return _shares(*map(self.of_axes, ("{}_residual_rad_s", "{}_threshold_rad_s")))
 
     def residuals_of(self, estimator: str) -> np.ndarray:
         """The residuals of an isolation estimator, (3, frames) rad/s; 0 as long as it does not work."""
@@ -137,3 +133,9 @@ class Flown:
         others = [self.is_excluded(name) for name in ESTIMATORS if name != estimator]
         is_alone = np.all(others, axis=0) & ~self.is_excluded(estimator) & (self.log["detected"] == 1)
         return float(is_alone.sum() * self.frame_s)
+
+
+def _shares(residual: np.ndarray, threshold: np.ndarray) -> np.ndarray:
+    """|residual / threshold|; 0 / 0 is 0, as both start from 0, and so is NaN, before an estimator works."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.nan_to_num(np.abs(residual / threshold), posinf=np.inf)

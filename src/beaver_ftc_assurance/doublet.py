@@ -123,7 +123,7 @@ def _least_amplitude(targets: dict[int, float], at: Situation, frames_to_target:
     above: list[tuple[Any, float]] = []  # rows of inequalities with their limits: row @ unknowns <= limit
     for u, p, s in zip(blocks[:n], blocks[n:], surfaces, strict=False):
         away = targets[s] - at.u[s]
-        (a, b) = at.remaining_way(s)
+        a, b = at.remaining_way(s)
         m = b * (before @ p) + (1.0 - b) * u
         equal += [
             p - a * (before @ p) - (1.0 - a) * u,  # p[k] = a p[k-1] + (1 - a) u[k]

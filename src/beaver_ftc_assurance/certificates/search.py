@@ -141,7 +141,7 @@ def of_type(hypothesis: Hypothesis, k: int) -> Tests:
     if hypothesis.slope.any():
         yield of_constant_theta(hypothesis, frames)
     for frame in frames[-3:].tolist():
-        yield from ([Term(sign * d, inf, frame - 1, frame)] for d in np.eye(3) for sign in (1.0, -1.0))
+        yield from filters(inf, frame - 1, frame)
 
 
 def of_block(hypothesis: Hypothesis, blocks: History, k: int) -> Tests:

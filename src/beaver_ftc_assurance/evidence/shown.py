@@ -45,8 +45,7 @@ def run_plan(
         follows_from=[plan.sha256, [source.sha256 for source in plan.sources.values()]],
         lost=lambda case, why: failed(plan, case, why),
     )
-    document: Document = run_study(study, folder.parent, workers, progress)
-    return document
+    return run_study(study, folder.parent, workers, progress)
 
 
 def _html(document: Document) -> str:

@@ -53,8 +53,7 @@ class Source:
     @property
     def base(self) -> Scenario:
         """The scenario of all its flights, without the variations."""
-        scenario: Scenario = self.content
-        return scenario
+        return self.content
 
     @cached_property
     def columns(self) -> tuple[str, ...]:

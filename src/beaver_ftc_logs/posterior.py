@@ -104,8 +104,7 @@ def run_flight(flight: Innovations, model: Model, bank: HypothesisBank) -> BankR
         r_min = recent_scale(white, flight.is_known, model.rate_hz)
     states = build_states(model, flight.noise)
     noise = build_noise(model, flight.noise, flight.c)
-    run: BankRun = run_bank(flight.y, flight.F, flight.is_known, bank, states, noise, r_min, q)
-    return run
+    return run_bank(flight.y, flight.F, flight.is_known, bank, states, noise, r_min, q)
 
 
 def recent_scale(g: Floats, ok: np.ndarray, rate_hz: float) -> Floats:

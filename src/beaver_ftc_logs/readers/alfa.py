@@ -43,8 +43,7 @@ def _alfa_names() -> dict[str, dict[str, Any]]:
     """The tables in alfa.json. columns: name of a column -> topic, field, and unit in the topic, empty if it
     is already that of the column. failures: part and code of a failure status -> name of the failed part.
     """
-    sections: dict[str, dict[str, Any]] = json.loads(Path(__file__).with_name("alfa.json").read_text("utf-8"))
-    return sections
+    return json.loads(Path(__file__).with_name("alfa.json").read_text("utf-8"))
 
 
 def read(path: Path, _wanted: Any = None) -> RecordedFlight:

@@ -6,6 +6,7 @@ the extra `flights`.
 """
 
 from collections.abc import Iterator
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,7 @@ import numpy as np
 
 from beaver_ftc.documents import BadInput
 from beaver_ftc_logs.readers.topics import Topic, flight_of_topics, package_errors_as_bad_input
-from beaver_ftc_logs.recording import Parameters, RecordedFlight, Wanted, add_parameter
+from beaver_ftc_logs.recording import Floats, Ints, Parameters, RecordedFlight, Wanted, add_parameter
 
 _TIME_FIELD = "TimeUS"
 # The first of these fields that a message has holds the number of its instance.
@@ -58,8 +59,10 @@ def _topics_of_instances(name: str, messages: Any) -> Iterator[tuple[str, Topic]
     numbers = messages.numbers(key).astype(int) if key else np.zeros(len(stamps), dtype=int)
     for number in dict.fromkeys(numbers.tolist()):
         rows = np.flatnonzero(numbers == number)
-
-        def values(field: str, rows: Any = rows) -> Any:
-            return messages.numbers(field)[rows]
-
+        values = partial(_values, messages, rows)
         yield f"{name}{number}" if number else name, Topic(stamps[rows], fields, values)
+
+
+def _values(messages: Any, rows: Ints, field: str) -> Floats:
+    """The numbers of a field in these rows of the messages."""
+    return messages.numbers(field)[rows]

@@ -42,11 +42,13 @@ class Messages:
         """The fields that hold numbers, in their order, with int or float. In a log as text, a flight mode
         (code M) is a word and not a number.
         """
-        types = dict(enumerate(self.format.msg_types))
-        codes = self.format.msg_fmts
-        words = {i for i, code in enumerate(codes) if self.is_text and code == "M"}
-        places = {field: i for field, i in self.format.colhash.items() if i not in words}
-        return {field: types[i] for field, i in places.items() if types.get(i) in (int, float)}
+        cells = [*zip(self.format.msg_types, self.format.msg_fmts, strict=False)]
+        known = {field: cells[i] for field, i in self.format.colhash.items() if i < len(cells)}
+        return {
+            field: kind
+            for field, (kind, code) in known.items()
+            if kind in (int, float) and not (self.is_text and code == "M")
+        }
 
     def numbers(self, field: str) -> Floats:
         """The numbers of a field, (n,). To divide by 1e7 is more exact than to multiply by 1e-7."""

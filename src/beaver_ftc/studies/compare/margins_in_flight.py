@@ -103,5 +103,4 @@ def _transform(values: np.ndarray, angles: np.ndarray) -> np.ndarray:
     The caller transforms changes from frame to frame. Positions would not return to zero behind an
     integrator.
     """
-    transform: np.ndarray = np.exp(-1j * np.outer(angles, np.arange(len(values)))) @ values
-    return transform
+    return np.exp(-1j * np.outer(angles, np.arange(len(values)))) @ values

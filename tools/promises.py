@@ -14,22 +14,20 @@ from pathlib import Path
 from typing import Any
 from zlib import crc32
 
-import yaml
+from tools.data import yaml_of
 
 TESTS = Path(__file__).parents[1] / "tests"
 
 
 def table() -> dict[str, Any]:
     """By its name: what a promise says, and the names of its tests."""
-    found: dict[str, Any] = yaml.safe_load((TESTS / "promises.yaml").read_text(encoding="utf-8"))
-    return found
+    return yaml_of(TESTS / "promises.yaml")
 
 
 @cache
 def rows() -> list[dict[str, list[str]]]:
     """What tests/nightly.yaml says."""
-    found: list[dict[str, list[str]]] = yaml.safe_load((TESTS / "nightly.yaml").read_text(encoding="utf-8"))
-    return found
+    return yaml_of(TESTS / "nightly.yaml")
 
 
 @cache

@@ -26,6 +26,7 @@ import yaml
 from beaver_ftc.aircraft import Aircraft, Term, load
 from beaver_ftc.aircraft.aircraft import FORCES, MOMENTS
 from beaver_ftc.plant.instrumented import actuator_system
+from tools.data import yaml_of
 
 SPAN_M, CABIN_M, JOINT, HINGE = 14.63, 1.22, 0.55, 0.25
 HALF_SPAN_M = SPAN_M / 2
@@ -141,7 +142,7 @@ def files(
     whole: Aircraft, parts: Parts, groups: Mapping[str, list[str]], name: str, says: str
 ) -> dict[str, str]:
     """The files of the folder, by their names."""
-    filed = yaml.safe_load((whole.folder / "aircraft.yaml").read_text(encoding="utf-8"))
+    filed = yaml_of(whole.folder / "aircraft.yaml")
     filed |= {"name": name, "description": says, "jsbsim": f"{name}.xml", "groups": dict(groups)}
     surfaces = {}
     for surface, of in filed["surfaces"].items():

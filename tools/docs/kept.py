@@ -13,45 +13,39 @@ from beaver_ftc.studies.engine.files import write_whole
 from tools.docs.commands import Output
 from tools.docs.pages import ROOT
 
-CODE = (
-    "src",
-    "aircraft",
-    "scenarios",
-    "evidence",
-    "examples",
-    "benchmarks",
-    "tools",
-    "tests/acceptance",
-    "tests/data",
-    "pyproject.toml",
-)
-RUNS = (  # what a command of the package can read, and what lays out its folder
-    *("src", "aircraft", "scenarios", "evidence", "examples", "pyproject.toml"),
-    *("tests/acceptance", "tools/docs/commands.py", "tools/check_certificate.py"),
-)
+PACKAGE = ("src", "aircraft", "scenarios", "evidence", "examples", "pyproject.toml", "tests/acceptance")
+# What a command of the package can read, and what lays out its folder; what one of `tools/` can read.
+RUNS = (*PACKAGE, "tools/docs/commands.py", "tools/check_certificate.py")
+CODE = (*PACKAGE, "benchmarks", "tools", "tests/data")
 PAGES = ("docs", "README.md", "CONTRIBUTING.md")
-# none of these reads a page: text can be changed without a flight
-MAKES_TABLE = "python -m tools.docs table "
-READS_CODE = (MAKES_TABLE, "python -m tools.docs reference ", "python -m tools.docs constants")
+# Commands of `tools/` that read no page: the text of a page can change, and they are not run again.
+READS_CODE = tuple(f"python -m tools.docs {printer}" for printer in ("table ", "reference ", "constants"))
 _FILE_OF_READER = re.compile(r"^ *```(?:yaml|python)\n.*?^ *```$", re.MULTILINE | re.DOTALL)
 _UNUSED_S = 14.0 * 86400.0
 
 
 class Kept:
-    """Outputs of earlier runs. needed: environment variables that lead to data."""
+    """Outputs of earlier runs. needed: environment variables that lead to data.
+
+    Digests of what a command can read: _package, a command of the package; _code, one of READS_CODE; _pages,
+    another one of `tools/`. _folder: None if nothing is kept.
+    """
 
     def __init__(self, needed: Collection[str]) -> None:
         base = cache_base()
-        self._folder = base / "printed" if base else None
-        named = "".join(f"{name}={os.environ.get(name)};" for name in sorted(needed))
-        self._code = _digest(CODE, named)
+        self._folder = base and base / "printed"
+        data = "".join(f"{name}={os.environ.get(name)};" for name in sorted(needed))
+        self._package = _digest(RUNS, data + _files_of_readers())
+        self._code = _digest(CODE, data)
         self._pages = _digest(PAGES, self._code)
-        self._shown = _digest(RUNS, named + _files_of_readers())
 
     def _file(self, line: str) -> Path | None:
-        whole = self._code if line.startswith(READS_CODE) else self._pages
-        state = whole if "python -m " in line else self._shown
-        return self._folder and self._folder / f"{sha256(f'{state} {line}'.encode()).hexdigest()[:24]}.pickle"
+        """The file of a command: its name changes with the command and with all that the command can read."""
+        readable = self._code if line.startswith(READS_CODE) else self._pages
+        if "python -m " not in line:
+            readable = self._package
+        name = sha256(f"{readable} {line}".encode()).hexdigest()[:24]
+        return self._folder and self._folder / f"{name}.pickle"
 
     def get(self, line: str) -> Output | None:
         """What this command printed when everything that it can read was as it is now."""
@@ -59,11 +53,10 @@ class Kept:
         if file is None or not file.exists():
             return None
         os.utime(file)
-        found: Output = pickle.loads(file.read_bytes())
-        return found
+        return pickle.loads(file.read_bytes())
 
     def put(self, line: str, output: Output) -> None:
-        """Keep what can be used; drop what nobody has asked for in a fortnight."""
+        """Keep an output without a fault; remove files that were not used for a fortnight."""
         file = self._file(line)
         if file is None or output.fault:
             return
@@ -75,7 +68,7 @@ class Kept:
 
 
 def _digest(places: Collection[str], more: str) -> str:
-    """A name for the contents of these files and folders, and of the environment that runs them."""
+    """SHA-256 of the files of these places and of the text `more`."""
     digest = sha256(more.encode())
     for path in _files(places):
         content = path.read_bytes()

@@ -10,11 +10,9 @@ import subprocess
 from collections.abc import Iterator, Sequence
 from functools import cache
 from pathlib import Path
-from typing import Any
-
-import yaml
 
 from beaver_ftc.documents.errors import nearest
+from tools.data import yaml_of
 from tools.docs.marks import Page
 from tools.docs.pages import COMMENT, ROOT, Finding, blanked, is_generated
 
@@ -140,8 +138,7 @@ def shown(text: str) -> frozenset[str]:
 
 def foreign() -> dict[str, str]:
     """{name of others: whose}."""
-    listed: dict[str, Any] = yaml.safe_load(FOREIGN.read_text(encoding="utf-8"))
-    return {str(name): whose for whose, names in listed.items() for name in names}
+    return {str(name): whose for whose, names in yaml_of(FOREIGN).items() for name in names}
 
 
 def check(pages: Sequence[Page], every: bool = True) -> list[Finding]:

@@ -6,13 +6,12 @@ from functools import cache
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
-import yaml
-
 from beaver_ftc.design.fdc import SURFACES
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.documents.files import data_root
 from beaver_ftc.plant.model_file import with_systems
 from beaver_ftc.studies.present.tables import markdown_table
+from tools.data import yaml_of
 
 _XML = "aircraft/beaver/beaver.xml"
 _OPERATIONS = ("product", "sum", "max", "ifthen")
@@ -133,7 +132,7 @@ def _default(values: dict[str, float]) -> str:
 @cache
 def texts() -> Mapping[str, Mapping[str, str]]:
     """Words of properties that can be set, by the end of the name, and of others, by name."""
-    return yaml.safe_load(_TEXTS.read_text(encoding="utf-8"))
+    return yaml_of(_TEXTS)
 
 
 def meaning_of(name: str) -> str:

@@ -60,5 +60,4 @@ def keep_it(folder: Path, drawn: Drawn, outcome: Outcome, shrink: bool) -> None:
 
 def plain(words: Words) -> Words:
     """The data without tuples and NumPy numbers, which YAML cannot write."""
-    found: Words = json.loads(json.dumps(words, default=np.generic.item))
-    return found
+    return json.loads(json.dumps(words, default=np.generic.item))

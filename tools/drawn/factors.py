@@ -10,9 +10,8 @@ from fnmatch import fnmatchcase
 from functools import cache
 from pathlib import Path
 
-import yaml
-
 from beaver_ftc.plugins import DETECTORS, LAWS, OURS, registered
+from tools.data import yaml_of
 from tools.drawn.array import Factor, Forbidden
 from tools.drawn.ranges import DECLARED_ONLY, RANGES
 from tools.drawn.walk import NEVER
@@ -140,7 +139,7 @@ def together(schema: Node, declared: bool) -> Forbidden:
     """Which levels together.yaml rules out, and what of a jam cannot grow."""
     rules = [
         (name, Levels(levels), other, Levels(there))
-        for rule in yaml.safe_load(TOGETHER.read_text(encoding="utf-8"))
+        for rule in yaml_of(TOGETHER)
         if declared or not rule.get("declared")
         for name, levels in rule["if"].items()
         for other, there in rule["then"].items()

@@ -15,11 +15,12 @@ import yaml
 from beaver_ftc_assurance.certificates import check_certificate as checker
 from beaver_ftc_assurance.certificates.certificate import MEASURED_MODEL_BOUND
 from beaver_ftc_assurance.certificates.certified import with_digest
+from tools.data import yaml_of
 
 Document = dict[str, Any]
 Log = dict[str, np.ndarray]
 TYPES = ("stuck", "float", "bias", "loss_of_effectiveness", "hardover up", "oscillatory", "rate_limit")
-FORGED = yaml.safe_load(Path(__file__).with_name("forged.yaml").read_text(encoding="utf-8"))
+FORGED = yaml_of(Path(__file__).with_name("forged.yaml"))
 
 
 def places(node: Any, place: tuple = ()) -> Iterator[tuple]:

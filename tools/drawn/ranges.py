@@ -5,15 +5,12 @@ Each takes the circumstances, the key's path and the numbers of the file.
 
 from functools import partial
 from math import degrees
-from pathlib import Path
 from typing import Any
 
-import yaml
-
 from beaver_ftc.scenario.sensors import PRESETS
+from tools.data import beside
 from tools.drawn.walk import NEVER, Circumstances, Ranges, log_uniform
 
-FILE = Path(__file__).with_name("ranges.yaml")
 AT_THE_BOUND = 0.3  # share of errors that are as large as they may be
 LARGE_REFERENCES = 0.1  # share of amplitudes beyond what an aircraft can follow
 COARSEST = PRESETS["consumer-grade"]
@@ -158,7 +155,7 @@ def wind(now: Circumstances, path: str) -> list[float]:
 def _read() -> dict[str, Any]:
     """{pattern: function of circumstances and path, or NEVER for a key that is left out}."""
     found: dict[str, Any] = {}
-    for pattern, drawn in yaml.safe_load(FILE.read_text(encoding="utf-8")).items():
+    for pattern, drawn in beside(__file__).items():
         found[pattern] = drawn
         for name, numbers in drawn.items() if drawn != NEVER else ():
             found[pattern] = partial(_numbered, globals()[name], numbers)

@@ -15,8 +15,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 from scipy.io import loadmat
+
+from tools.data import yaml_of
 
 WHERE = "BEAVER_FTC_GTM"
 DATABASE = "T2_polynomial_aerodatabase.mat"
@@ -64,7 +65,7 @@ class Specification:
     """The aircraft. gravity: ft/s2; that of the source if none is given."""
 
     def __init__(self, where: Path, gravity: float | None = None) -> None:
-        self.of: dict[str, Any] = yaml.safe_load((where / "parameters.yaml").read_text(encoding="utf-8"))
+        self.of: dict[str, Any] = yaml_of(where / "parameters.yaml")
         self.base = loadmat(where / DATABASE, struct_as_record=False, squeeze_me=True)
         self.gravity = gravity or self.of["mass"]["gravity"]["value"]
         self._tables: dict[str, tuple[np.ndarray, list[list[float]]]] = {}

@@ -10,8 +10,7 @@ from functools import cache
 from itertools import chain, zip_longest
 from pathlib import Path
 
-import yaml
-
+from tools.data import yaml_of
 from tools.mutants.making import Mutant, mutants
 from tools.mutants.syntax import imports, tree
 
@@ -194,7 +193,7 @@ def drawn(seed: int, patterns: Sequence[str]) -> tuple[list[tuple[str, Mutant]],
 
 def equivalent() -> set[str]:
     """The names of the mutants that change no result; the file has the reasons."""
-    listed = yaml.safe_load(EQUIVALENT.read_text()) or {}
+    listed = yaml_of(EQUIVALENT) or {}
     return {f"{file}: {change}" for file, changes in listed.items() for change in changes}
 
 

@@ -6,7 +6,6 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-import yaml
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.control.profile import COLUMNS as PROFILE
@@ -22,6 +21,7 @@ from beaver_ftc.studies.present.tables import markdown_table
 from beaver_ftc.studies.sweep.columns import columns_of
 from beaver_ftc.studies.sweep.one_flight import FIXED
 from beaver_ftc_logs.log_rows import LogRows
+from tools.data import yaml_of
 
 TEXTS = Path(__file__).with_name("columns.yaml")
 NUMBER, TEXT, FLAG = "number", "text", "flag"
@@ -104,7 +104,7 @@ _NEXT = """## Next
 
 def page() -> str:
     """The page."""
-    texts = yaml.safe_load(TEXTS.read_text(encoding="utf-8"))
+    texts = yaml_of(TEXTS)
     return (
         "\n\n".join(["# Columns", _said(), *(_table(name, texts[name]) for name in tables()), _NEXT]) + "\n"
     )

@@ -8,8 +8,6 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path as File
 from typing import Any, NamedTuple
 
-import yaml
-
 from beaver_ftc.aircraft import load
 from beaver_ftc.aircraft.schema import AircraftFile
 from beaver_ftc.scenario.schema import json_schema
@@ -17,6 +15,7 @@ from beaver_ftc.scenario.sweeps import sweep_json_schema
 from beaver_ftc.studies.present.tables import markdown_table
 from beaver_ftc_assurance.evidence.plan import plan_json_schema
 from beaver_ftc_logs.vehicle import Vehicle
+from tools.data import beside
 from tools.docs.reference.options import options_and_presets
 from tools.docs.reference.schema import ITEM, NAME, Key, Node, Path, Section, Sections, dotted
 from tools.docs.reference.value import default_of, in_a_line, size_of, value_of
@@ -230,5 +229,5 @@ KINDS = {
     "aircraft-keys": Kind(AircraftFile.model_json_schema),
     "vehicle-keys": Kind(Vehicle.model_json_schema),
 }
-_TEXTS = yaml.safe_load(File(__file__).with_suffix(".yaml").read_text(encoding="utf-8"))
+_TEXTS = beside(__file__)
 PAGES: dict[str, tuple[Any, ...]] = {name: tuple(of.values()) for name, of in _TEXTS["pages"].items()}

@@ -48,8 +48,7 @@ def table(name: str = "") -> str:
     known, name = makers(), name.replace("_", "-")
     if name not in known:
         raise BadInput(f"{name}: no such table{suggestion(name, known)}")
-    made: str = getattr(import_module(f"tools.docs.tables.{known[name]}"), name.replace("-", "_"))()
-    return made
+    return getattr(import_module(f"tools.docs.tables.{known[name]}"), name.replace("-", "_"))()
 
 
 def beaver(*arguments: str, cwd: Path, longest_s: float | None = None) -> subprocess.CompletedProcess[str]:

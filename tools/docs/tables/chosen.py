@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.documents.document import parse
 from beaver_ftc.studies.compare.sets import CALIBRATION, DRAW
 from beaver_ftc.studies.present.page import Table
+from tools.data import yaml_of
 from tools.docs.tables import aside, head_and_rows
 
 Document = dict[str, Any]
@@ -62,14 +62,12 @@ def _value_text(file: str, name: str) -> str:
 
 def not_chosen_constants() -> dict[str, dict[str, str]]:
     """By file: the name of each constant that no recorded choice has, and the origin of its value."""
-    found: dict[str, dict[str, str]] = parse(NOT_CHOSEN_FILE.read_text(encoding="utf-8")).data
-    return found
+    return yaml_of(NOT_CHOSEN_FILE)
 
 
 def choices() -> list[Document]:
     """Every constant that was chosen by flights."""
-    found: list[Document] = parse(FILE.read_text(encoding="utf-8")).data
-    return found
+    return yaml_of(FILE)
 
 
 def draws_of(flights: Document) -> set[tuple[str, int]]:
@@ -85,8 +83,7 @@ def _given(numbers: Sequence[int] | str) -> Sequence[int]:
     if not isinstance(numbers, str):
         return numbers
     module, name = numbers.split(":")
-    found: Sequence[int] = getattr(import_module(module), name)
-    return found
+    return getattr(import_module(module), name)
 
 
 def _of_sets(sets: list[str] | str) -> list[int]:
@@ -95,7 +92,7 @@ def _of_sets(sets: list[str] | str) -> list[int]:
     if sets == COMPARED:
         sets = [name for name in known if not name.startswith(CALIBRATION)]
     files = (path for name in sets for path in sorted((BENCHMARK / name).glob("*.yaml")))
-    return [int(parse(path.read_text(encoding="utf-8")).data["seed"]) for path in files]
+    return [int(yaml_of(path)["seed"]) for path in files]
 
 
 def _said(flights: Document) -> str:

@@ -11,8 +11,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from beaver_ftc.documents.errors import BeaverFtcError
 from beaver_ftc.scenario.schema import load
 from beaver_ftc.studies.matrix.fault_matrix import FAULTS, FaultCase, airspeeds_of, fly_case
@@ -20,6 +18,7 @@ from beaver_ftc.studies.present.tables import markdown_table
 from beaver_ftc_aircraft.derive.first_use import derive_if_needed
 from beaver_ftc_live.page import messages
 from beaver_ftc_live.page.session import Session
+from tools.data import beside
 from tools.docs.tables import beaver
 
 PLANES = {
@@ -37,7 +36,7 @@ STUDIES = ("sweep", "compare", "detectability")
 
 
 RUN = "run S.yaml --no-report"
-FEATURES = yaml.safe_load(Path(__file__).with_suffix(".yaml").read_text(encoding="utf-8"))
+FEATURES = beside(__file__)
 
 
 def features() -> str:

@@ -3,16 +3,14 @@
 limits.yaml has the flights.
 """
 
-from pathlib import Path
 from typing import Any
-
-import yaml
 
 import beaver_ftc as bf
 from beaver_ftc.studies.present.tables import markdown_table
+from tools.data import beside
 
 AT_S, DURATION_S = 12.0, 30.0
-CASES = yaml.safe_load(Path(__file__).with_suffix(".yaml").read_text(encoding="utf-8"))
+CASES = beside(__file__)
 
 
 def hidden_faults() -> str:

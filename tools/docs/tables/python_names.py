@@ -3,18 +3,17 @@
 import inspect
 import re
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 from typing import Any
 
-import yaml
 from pydantic import BaseModel
 
 import beaver_ftc as bf
 from beaver_ftc.studies.present.tables import markdown_table
+from tools.data import beside
 
 RECORDS = "results.model"
 Names = Mapping[str, list[str]]
-NAMES: dict[str, Names] = yaml.safe_load(Path(__file__).with_suffix(".yaml").read_text(encoding="utf-8"))
+NAMES: dict[str, Names] = beside(__file__)
 SAYS = {
     "Records of a flight": "The attributes of a `Flight` are records, with the fields of `metrics.json`.",
     "Aircraft, trim and linear models": "`bf.aircraft(NAME)` calls `aircraft.load`. It also derives "

@@ -1,14 +1,13 @@
 """Table of the constants, in docs/reference/glossary.md; theory.yaml says which, and what each means."""
 
 from importlib import import_module
-from pathlib import Path
 
 import numpy as np
-import yaml
 
 from beaver_ftc.studies.present.tables import markdown_table
+from tools.data import beside
 
-SECTIONS = yaml.safe_load(Path(__file__).with_suffix(".yaml").read_text(encoding="utf-8"))
+SECTIONS = beside(__file__)
 
 
 def theory_constants() -> str:

@@ -273,16 +273,14 @@ class _Flight:
                 yield {"what": kinds.exclusion_name(surface, kind), "because": kinds.TYPE_TOO_LATE}
                 continue
             row = self.tape.first + row_set_to_end(self.tape.types[:, s, kind])
-            because = kinds.EXCLUDED_BY_MANY_FRAMES
-            evidence: Document | None = None
-            if any_block:
-                reason = kinds.reason_not_certified(history.tape, kind)
-                because = reason or because
-                evidence = None if reason else self._type(history, s, kind, k)
+            evidence = None
+            reason = kinds.reason_not_certified(history.tape, kind) if any_block else None
+            if any_block and reason is None:
+                evidence = self._type(history, s, kind, k)
             yield {
                 "what": kinds.exclusion_name(surface, kind),
                 "column": kinds.exclusion_column(surface, kind), "frame": row,
-            } | (evidence or {"because": because})  # fmt: skip
+            } | (evidence or {"because": reason or kinds.EXCLUDED_BY_MANY_FRAMES})  # fmt: skip
 
     def _type(self, history: History, s: int, kind: int, k: int) -> Document | None:
         """Evidence against a type on surface s at frame k; None if there is none. history, k: by frames or,

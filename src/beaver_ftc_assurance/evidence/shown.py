@@ -43,7 +43,7 @@ def run_plan(
         document=lambda rows: document_of(plan, rows, now),
         files=FILES,
         follows_from=[plan.sha256, [source.sha256 for source in plan.sources.values()]],
-        lost=lambda case, why: failed(plan, case, why),
+        lost=partial(failed, plan),
     )
     return run_study(study, folder.parent, workers, progress)
 
@@ -109,16 +109,13 @@ def _summary(requirements: list[Document]) -> Table:
     """The table of requirements. If one page does not hold all, those not met come first, and the last line
     has the number of the others.
     """
-    requirements_shown = requirements
-    if len(requirements_shown) > ON_THE_SUMMARY:
-        requirements_shown = sorted(requirements_shown, key=lambda row: WORST_FIRST.index(row["verdict"]))[
-            :ON_THE_SUMMARY
-        ]
+    n_left = max(len(requirements) - ON_THE_SUMMARY, 0)
+    if n_left:
+        requirements = sorted(requirements, key=lambda row: WORST_FIRST.index(row["verdict"]))
     rows = [
         (row["id"], _short(row["text"]), row["verdict"], margin_of(row), row["worst"]["flight"])
-        for row in requirements_shown
+        for row in requirements[:ON_THE_SUMMARY]
     ]
-    n_left = len(requirements) - len(requirements_shown)
     rows += [("", f"{n_left} more", "", "", "")] if n_left else []
     return Table(("", "requirement", "verdict", "margin", "worst flight"), rows, VERDICTS)
 
@@ -242,8 +239,10 @@ def as_text(document: Document, folder: str) -> str:
 
 def as_expectations(document: Document) -> tuple[Expectation, ...]:
     """The requirements for JUnit XML, each with its worst flight."""
-    rows = ((row["id"], _condition_in_words(row["asked"]), row["worst"]) for row in document["requirements"])
-    return tuple(_expectation(*row) for row in rows)
+    return tuple(
+        _expectation(row["id"], _condition_in_words(row["asked"]), row["worst"])
+        for row in document["requirements"]
+    )
 
 
 def _expectation(name: str, expected: str, worst: Document) -> Expectation:
@@ -269,8 +268,8 @@ def of_flight(plan: EvidencePlan, name: str) -> tuple[Any, tuple[Expectation, ..
         raise BadInput(
             f"--replay: {plan.given} has no flight {name[:100]!r}{suggestion(name, list(named)[:50])}"
         )
-    results = fly_flight(plan, named[name])["found"]
-    (source, run) = named[name]
+    source, run = named[name]
+    results = fly_flight(plan, (source, run))["found"]
     judged = tuple(
         _expectation(id, in_words(part["expected"]), part)
         for id, parts in results.items() for part in parts

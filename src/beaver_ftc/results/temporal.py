@@ -249,7 +249,7 @@ def _robustness_by_frame(
             return _FRAMEWISE_FUNCTION_OF_OPERATOR[operator](*parts)
     begin, end = (round(t * rate_hz) for t in formula.interval or (0.0, frames / rate_hz))
     if operator == "until":
-        return _until_robustness(parts[0], parts[1], begin, min(end, frames))
+        return _until_robustness(parts[0], parts[1], begin, end)
     sign = 1.0 if operator in ("always", "historically") else -1.0
     # in a flight backwards the past is the future
     along = -1 if operator in ("once", "historically") else 1
@@ -279,10 +279,8 @@ def _until_robustness(held: np.ndarray, reached: np.ndarray, begin: int, end: in
     """max over j in begin..end of min(reached[k + j], min(held[k : k + j])) at each k, (frames,)."""
     frames = len(held)
     best, least_held = np.full(frames, -np.inf), np.full(frames, np.inf)
-    for j in range(end + 1):
+    for j in range(min(end + 1, frames)):
         n = frames - j
-        if n <= 0:
-            break
         if j >= begin:
             best[:n] = np.maximum(best[:n], np.minimum(least_held[:n], reached[j:]))
         least_held[:n] = np.minimum(least_held[:n], held[j:])

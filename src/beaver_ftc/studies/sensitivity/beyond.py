@@ -28,8 +28,6 @@ FAILED = {"failed": True}  # the row of a flight that cannot be flown to its end
 FLIGHTS = 40  # of a row; if none has an event, its probability is below 9 % (95 % confidence)
 LATER_S = 4.0  # largest delay of the begin of the faults
 LEFT_S = 5.0  # shortest time that a delay leaves from the begin of the last fault to the end
-
-
 Errors = Sequence[Error]  # the errors of a scenario
 
 

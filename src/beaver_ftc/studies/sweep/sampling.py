@@ -100,9 +100,10 @@ class Plan:
 
     def __init__(self, sweep: Sweep) -> None:
         self._file: SweepFile = sweep.file
-        vary = sweep.file.vary.items()
-        self._in_turn = [(key, variation) for key, variation in vary if _is_in_turn(sweep.file, variation)]
-        self._drawn = [(key, variation) for key, variation in vary if not _is_in_turn(sweep.file, variation)]
+        is_grid = sweep.file.sampling == "grid"
+        vary = sweep.file.vary
+        self._in_turn = {key: of for key, of in vary.items() if is_grid or of.linspace is not None}
+        self._drawn = {key: of for key, of in vary.items() if key not in self._in_turn}
 
     def assignments(self, indices: Sequence[int]) -> list[Assignment]:
         """The values of these flights. indices: increasing."""
@@ -128,16 +129,11 @@ class Plan:
 
     def _values(self, index: int, point: np.ndarray) -> Document:
         """The values of one flight. point: u of the drawn keys."""
-        values = values_at(self._drawn, point)
-        for key, variation in reversed(self._in_turn):
+        values = values_at(self._drawn.items(), point)
+        for key, variation in reversed(self._in_turn.items()):
             index, position = divmod(index, variation.count or 1)
             values[key] = counted_value(variation, position)
         return {key: values[key] for key in self._file.vary}
-
-
-def _is_in_turn(file: SweepFile, variation: Variation) -> bool:
-    """Whether a key takes its values in turn."""
-    return file.sampling == "grid" or variation.linspace is not None
 
 
 @lru_cache(maxsize=1)  # every batch of a sweep uses it

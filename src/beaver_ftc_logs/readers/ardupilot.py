@@ -14,7 +14,12 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.documents import BadInput
-from beaver_ftc_logs.readers.topics import Topic, flight_of_topics, package_errors_as_bad_input
+from beaver_ftc_logs.readers.topics import (
+    Topic,
+    flight_of_topics,
+    names_of_topics,
+    package_errors_as_bad_input,
+)
 from beaver_ftc_logs.recording import Floats, Ints, Parameters, RecordedFlight, Wanted, add_parameter
 
 _TIME_FIELD = "TimeUS"
@@ -48,7 +53,7 @@ def read(path: Path, wanted: Wanted = None) -> RecordedFlight:
         if not topics:
             reason = "holds no message with a time stamp, allowed: a dataflash log of a flight"
             raise BadInput(f"{path}: {reason}")
-        return flight_of_topics(path, topics, wanted, topics, params)[0]
+        return flight_of_topics(path, topics, wanted, names_of_topics(topics), params)[0]
 
 
 def _topics_of_instances(name: str, messages: Any) -> Iterator[tuple[str, Topic]]:

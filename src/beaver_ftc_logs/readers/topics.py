@@ -63,20 +63,17 @@ def flight_of_topics(
     path: Path,
     topics: Mapping[str, Topic],
     wanted: Wanted,
-    all_topics: Mapping[str, Topic],
+    names: tuple[str, ...],
     params: Parameters,
 ) -> tuple[RecordedFlight, float | None]:
     """The flight with the columns `topic.field` of a log: those of the wanted names, all of `topics` if
     wanted is None; and the stamp, s, from which its times count, None if no row has one.
 
-    topics: the topics that were read, those of the wanted columns among them. all_topics: topics whose names
-    the flight has as names of all columns. It is `topics` itself if they have every wanted column. If one is
-    missing, it is all topics of the log, whose names the message about the missing column lists.
-
-    The origin of the times is the earliest stamp of `topics`. If all_topics has none of the wanted names, the
-    columns are all of its names, without rows.
+    topics: the topics that were read, those of the wanted columns among them; the earliest of their stamps is
+    the origin of the times. names: of the columns of all topics of the log, which the message about a missing
+    column lists; those of `topics` are enough if no wanted column is missing. If none of `names` is wanted,
+    the flight has a column without rows for each of them.
     """
-    names = names_of_topics(all_topics)
     flight = RecordedFlight(path.stem, {}, parameters=params, unread_column_names=names)
     if wanted is not None and not {*wanted} & {*names}:
         flight.columns.update(dict.fromkeys(names, Column(np.empty(0), np.empty(0))))

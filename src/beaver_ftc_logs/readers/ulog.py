@@ -36,7 +36,7 @@ def read(path: Path, wanted: Wanted = None) -> RecordedFlight:
             all_topics = _read_topics(path, None, {})
         if not all_topics:
             raise refusal(path, "holds no message", "a log of a flight")
-        flight, origin_s = flight_of_topics(path, topics, wanted, all_topics, params)
+        flight, origin_s = flight_of_topics(path, topics, wanted, names_of_topics(all_topics), params)
     if origin_s is None:
         return flight
     return replace(flight, notes=(f"time counts from {origin_s:.3f} s of the autopilot's clock",))

@@ -26,6 +26,7 @@ from typing import Any
 
 import numpy as np
 
+from beaver_ftc.documents.files import read_json
 from beaver_ftc.studies.bench.sweep_flights import by_kind
 
 HERE = Path(__file__).resolve()
@@ -56,7 +57,7 @@ def measured_in(tree: Path, rounds: int, cache: Path) -> dict[str, Any]:
         check=True,
         capture_output=True,
     )
-    return json.loads(said.read_text(encoding="utf-8"))["kinds"]
+    return read_json(said)["kinds"]
 
 
 def rises(revision: str, rounds: int) -> dict[str, float]:
@@ -107,7 +108,7 @@ def main() -> int:
     parser.add_argument("--record", type=Path)
     given = parser.parse_args()
     if given.check is not None:
-        recorded = json.loads(given.check.read_text(encoding="utf-8"))
+        recorded = read_json(given.check)
         return check(recorded["revision"], given.rounds)
     kinds = by_kind(given.rounds)
     print(f"medians of {given.rounds} rounds, ms")

@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 
 import beaver_ftc as bf
+from beaver_ftc.documents.files import read_json
 from beaver_ftc.plugins import DETECTORS, LAWS
 from tools.drawn.factors import registered_of
 
@@ -68,7 +69,7 @@ def write(file: Path, every: int) -> None:
 
 def compare(one: Path, other: Path) -> int:
     """Print which flights differ among those of both files; the exit status."""
-    first, second = (json.loads(path.read_text(encoding="utf-8")) for path in (one, other))
+    first, second = map(read_json, (one, other))
     both = sorted(first.keys() & second.keys())
     differing = [name for name in both if first[name] != second[name]]
     print(*differing, f"{len(both)} in both, {len(differing)} differ", sep="\n")

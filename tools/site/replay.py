@@ -1,10 +1,10 @@
 """A flight that is replayed on the front page: drawn by what draws a report, and small."""
 
-import json
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from beaver_ftc.documents.files import read_json
 from beaver_ftc.results import report
 from beaver_ftc.results.style import MODE_COLOURS, marks
 from tools.docs.tables import front
@@ -23,7 +23,7 @@ def page() -> str:
     with TemporaryDirectory() as out:
         metrics = run(load_scenario(SCENARIO), Path(out), report=False)
         folder = Path(out, metrics["scenario"])
-        kept = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
+        kept = read_json(folder / "metrics.json")
         return report.template(Path(__file__).with_name("replay.html.j2")).render(
             scenario=SCENARIO,
             modes=MODE_COLOURS,

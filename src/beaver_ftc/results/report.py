@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from beaver_ftc.documents.files import read_json
 from beaver_ftc.results import log, verdict
 from beaver_ftc.results.expectations import expectations_in_words
 from beaver_ftc.results.model import Document, Metrics
@@ -57,7 +58,7 @@ def render(folders: Sequence[Path], names: Sequence[str] = (), sections: Sequenc
     """
     from markupsafe import Markup
 
-    documents = [json.loads((folder / "metrics.json").read_text(encoding="utf-8")) for folder in folders]
+    documents = [read_json(folder / "metrics.json") for folder in folders]
     all_metrics = [*map(Metrics.of, documents)]
     last_marks = {mark.name: mark for metrics in all_metrics for mark in marks(metrics)}.values()
     return template(_TEMPLATE_FOLDER / "report.html.j2").render(

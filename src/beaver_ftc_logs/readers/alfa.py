@@ -8,7 +8,6 @@ Time counts from the first row of `mavros-imu-data_raw`. A fault begins at the f
 `failure_status-*` topic that has its code.
 """
 
-import json
 from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
@@ -16,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from beaver_ftc.documents import read_json
 from beaver_ftc_logs.readers.table import read_numbers
 from beaver_ftc_logs.readers.topics import rows_with_increasing_time
 from beaver_ftc_logs.recording import Column, Columns, Floats, Ints, LoggedFailure, RecordedFlight
@@ -43,7 +43,7 @@ def _alfa_names() -> dict[str, dict[str, Any]]:
     """The tables in alfa.json. columns: name of a column -> topic, field, and unit in the topic, empty if it
     is already that of the column. failures: part and code of a failure status -> name of the failed part.
     """
-    return json.loads(Path(__file__).with_name("alfa.json").read_text("utf-8"))
+    return read_json(Path(__file__).with_name("alfa.json"))
 
 
 def read(path: Path, _wanted: Any = None) -> RecordedFlight:

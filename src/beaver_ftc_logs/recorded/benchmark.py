@@ -6,13 +6,13 @@ flights, every setting is fixed before the flight left out is read. Of a single 
 in turn, with settings fitted to the whole flight. Other detectors are compared with ours.
 """
 
-import json
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
 
+from beaver_ftc.documents import read_json
 from beaver_ftc.results import Document
 from beaver_ftc.studies.engine import poisson
 from beaver_ftc_logs import scoring
@@ -118,7 +118,7 @@ def _compare_methods(data: DataSet) -> Document:
         "scored_by": "labels" if by_labels else "events",
         "left_out": "each flight in turn" if settings is None else "halves of the one flight in turn",
         "rows": [{"method": title, **summarize(scores)} for title, scores in by_method.items()],
-        "published": json.loads(PUBLISHED_SCORES_FILE.read_text(encoding="utf-8")).get(data.name, []),
+        "published": read_json(PUBLISHED_SCORES_FILE).get(data.name, []),
         "flights": entries,
     }
 

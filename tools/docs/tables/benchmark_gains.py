@@ -1,9 +1,9 @@
 """The table of benchmark.md: what a second tuning brings."""
 
-import json
 from pathlib import Path
 from typing import Any
 
+from beaver_ftc.documents.files import read_json
 from beaver_ftc.studies.compare.tune import LEAST_GAIN
 from tools.docs.tables import aside, head_and_rows
 
@@ -30,7 +30,7 @@ GAINS = {
 def benchmark_gains() -> str:
     """By how much the cost of a method falls that is tuned again, on flights of its own: of every search that
     finds other values, as the record of the searches has it."""
-    rows = json.loads(TUNING.read_text(encoding="utf-8"))["methods"]
+    rows = read_json(TUNING)["methods"]
     found = [{**row, **again} for row in rows for again in row["again"] if again.get("gain")]
     last = {
         _pair(row): row["again"][-1]

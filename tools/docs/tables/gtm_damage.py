@@ -1,6 +1,5 @@
 """What aircraft.md prints of damage: where it can be flown, what flies there, what is found of it."""
 
-import json
 import os
 import tempfile
 from functools import cache
@@ -14,6 +13,7 @@ from benchmarks import gtm_informed as informed
 from matplotlib.figure import Figure
 
 import beaver_ftc as bf
+from beaver_ftc.documents.files import read_json
 from beaver_ftc.studies.present.tables import markdown_table
 from beaver_ftc_aircraft.gtm.conversion import convert
 from beaver_ftc_aircraft.gtm.parameters import cases
@@ -144,7 +144,7 @@ def gtm_laws() -> str:
     if not made.is_file():
         asked = ("compare", "--sweep", str(SWEEP), "--schemes", "adaptive-estimators", "--workers", "1")
         beaver(*asked, cwd=_kept()).check_returncode()
-    (of,) = json.loads(made.read_text(encoding="utf-8"))["sets"].values()
+    (of,) = read_json(made)["sets"].values()
     return table_of(of["lines"], {
         "law": "law", "flights": lambda one: str(of["flights"]), "aircraft lost": "departures",
         "before damage, deg/s": "before_median .3g", "after damage, deg/s": "after_median .3g",

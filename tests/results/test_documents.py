@@ -5,6 +5,7 @@ import math
 import pytest
 from synthetic import LOSS, landed, scenario
 
+from beaver_ftc.aircraft import load
 from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.results import verdict
 from beaver_ftc.results.exports import write_acmi
@@ -106,7 +107,7 @@ def test_what_xml_cannot_hold_and_what_is_too_long(tmp_path):
 
 
 def test_a_tacview_recording_has_25_frames_a_second(log_path, found, tmp_path):
-    write_acmi(log_path, found, tmp_path / "flight.acmi")
+    write_acmi(log_path, found, tmp_path / "flight.acmi", load())
     lines = (tmp_path / "flight.acmi").read_text(encoding="utf-8").splitlines()
     times = [float(line[1:]) for line in lines if line.startswith("#")]
     assert times == pytest.approx([k / 25.0 for k in range(len(times))])

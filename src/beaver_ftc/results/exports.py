@@ -6,7 +6,7 @@ from functools import partial
 from math import ceil, cos, degrees, radians
 from pathlib import Path
 
-from beaver_ftc.aircraft import Aircraft, load
+from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.aircraft.aircraft import EARTH_RADIUS_M
 from beaver_ftc.plant.adapter import START_LATITUDE_DEG
 from beaver_ftc.results import log
@@ -80,9 +80,8 @@ def write_csv(log_path: Path, path: Path) -> None:
                     writer.write_table(source.read_row_group(group))
 
 
-def write_acmi(log_path: Path, metrics: Metrics, path: Path, aircraft: Aircraft | None = None) -> None:
+def write_acmi(log_path: Path, metrics: Metrics, path: Path, aircraft: Aircraft) -> None:
     """The flight as a Tacview recording (ACMI 2.2): path, attitude, air data, flap, bookmarks for events."""
-    aircraft = aircraft or load()
     title = aircraft.file.description.partition(",")[0] or aircraft.name
     names = {"scenario": _escape_acmi_text(metrics.scenario), "aircraft": _escape_acmi_text(title)}
     with path.open("w", encoding="utf-8", newline="\n") as file:

@@ -61,7 +61,7 @@ _PLACED = ("longitude", "latitude", "altitude", "roll", "pitch", "yaw")
 
 
 def test_every_property_of_the_tacview_recording(path, columns, tmp_path):
-    write_acmi(path, measure(landed()), tmp_path / "flight.acmi")
+    write_acmi(path, measure(landed()), tmp_path / "flight.acmi", load())
     found = {}
     for line in (tmp_path / "flight.acmi").read_text().splitlines():
         if line.startswith("b1,T="):

@@ -43,7 +43,7 @@ def level_for(healthy: Sequence[Trace], per_h: float) -> float:
     return best
 
 
-def level_line(key: Key, level: float, healthy: Sequence[Trace], faulted: Sequence[Trace] = ()) -> Document:
+def level_line(key: Key, level: float, healthy: Sequence[Trace], faulted: Sequence[Trace]) -> Document:
     """A level with its false alarms: in the healthy flights that set it, before the faults of other flights,
     and at OWN_LEVEL in the healthy flights."""
     return {

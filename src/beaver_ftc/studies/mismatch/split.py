@@ -170,7 +170,6 @@ def split_flight(scenario: Scenario) -> tuple[Split, Metrics]:
     return split(scenario, log, unlogged), measure(flight)
 
 
-def _runs(mask: np.ndarray) -> list[tuple[int, int]]:
+def _runs(mask: np.ndarray) -> list[list[int]]:
     """First and past-the-end index of each unbroken run of True."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
-    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
+    return np.flatnonzero(np.diff(mask, prepend=False, append=False)).reshape(-1, 2).tolist()

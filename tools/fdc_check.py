@@ -5,10 +5,10 @@ The data are CSV files computed from the FDC equations by an independent impleme
 
 from dataclasses import dataclass
 from math import pi
-from pathlib import Path
 
 import numpy as np
 
+from beaver_ftc.documents.files import data_root
 from beaver_ftc.plant.adapter import FT_PER_M, FlightState, Plant
 from beaver_ftc.plant.linear import derivative
 
@@ -55,9 +55,9 @@ class Agreement:
         return self.bar is None or self.error <= self.bar
 
 
-def read_table(path: Path) -> np.ndarray:
-    """A CSV file with a header as a structured array."""
-    return np.genfromtxt(path, delimiter=",", names=True)
+def read_table(name: str) -> np.ndarray:
+    """A CSV file of the FDC data, which has a header, as a structured array."""
+    return np.genfromtxt(data_root() / "tests" / "data" / f"fdc_{name}.csv", delimiter=",", names=True)
 
 
 def flight_state(row: np.void) -> FlightState:
@@ -72,9 +72,9 @@ def flight_state(row: np.void) -> FlightState:
     )
 
 
-def derivative_agreement(folder: Path) -> list[Agreement]:
+def derivative_agreement() -> list[Agreement]:
     """RMS error over RMS value of each state derivative, over the random states."""
-    table = read_table(folder / "fdc_state_derivatives.csv")
+    table = read_table("state_derivatives")
     plant = Plant(rate_hz=100)
     found = np.array([derivative(plant, flight_state(row)) for row in table]).T
     return [
@@ -83,12 +83,12 @@ def derivative_agreement(folder: Path) -> list[Agreement]:
     ]
 
 
-def response_agreement(folder: Path, surface: str, rate_hz: int) -> list[Agreement]:
+def response_agreement(surface: str, rate_hz: int) -> list[Agreement]:
     """Largest error over span of each signal, in the 20 s after a doublet of `surface` begins the flight.
 
     The truth is flown as the loop flies it: after each run the state is read and the next command written.
     """
-    table = read_table(folder / f"fdc_{surface}_doublet.csv")
+    table = read_table(f"{surface}_doublet")
     agreements = []
     for name, flown in _fly(table, rate_hz).items():
         largest = np.abs(_difference(name, flown, table[name])).max()

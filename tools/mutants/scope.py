@@ -49,7 +49,7 @@ def kind(file: Path) -> str:
     for place, reason in APART.items():
         if file.is_relative_to(SOURCES / place):
             return reason
-    if file not in _compiled(SOURCES):
+    if file not in _compiled():
         return GLUE
     return KERNELS if _is_quick(file) else "fly"
 
@@ -66,7 +66,7 @@ def kind_of(mutant: Mutant) -> str:
 
 def _in_compiled_code(file: Path, line: int) -> bool:
     """Whether a line changes a kernel: a line of a kernel, of a constant, or of the layout of a record."""
-    if file not in _compiled(SOURCES):
+    if file not in _compiled():
         return False
     around = (node for node in tree(file).body if node.lineno <= line <= (node.end_lineno or 0))
     for node in around:
@@ -77,13 +77,13 @@ def _in_compiled_code(file: Path, line: int) -> bool:
 
 
 @cache
-def _compiled(sources: Path) -> frozenset[Path]:
+def _compiled() -> frozenset[Path]:
     """The modules with kernels, and the modules whose constants these kernels contain."""
-    found = {file for file in sources.rglob("*.py") if "beaver_ftc.compiled" in imports(file)}
+    found = {file for file in SOURCES.rglob("*.py") if "beaver_ftc.compiled" in imports(file)}
     due = list(found)
     while due:
         for module, names in imports(due.pop()).items():
-            file = (sources / module.replace(".", "/")).with_suffix(".py")
+            file = (SOURCES / module.replace(".", "/")).with_suffix(".py")
             constants = any(name.lstrip("_").isupper() for name in names)
             if constants and _is_quick(file) and file not in found and file.exists():
                 found.add(file)

@@ -2,19 +2,17 @@
 
 from collections.abc import Iterable
 
-from beaver_ftc.documents.files import data_root
 from beaver_ftc.studies.present.tables import markdown_table
 from tools.fdc_check import RESPONSE_BAR, Agreement, derivative_agreement, response_agreement
 
-DATA = data_root() / "tests" / "data"
 HEAD = ("compared", "frame rate, Hz", "worst signal", "error, %", "limit, %")
 
 
 def fdc() -> str:
     """The derivative with the largest error of those with a bar; of each doublet the worst signal."""
-    derivatives = (each for each in derivative_agreement(DATA) if each.bar is not None)
+    derivatives = (each for each in derivative_agreement() if each.bar is not None)
     doublets = [
-        (f"{surface} doublet", f"{rate_hz}", *_worst(response_agreement(DATA, surface, rate_hz)))
+        (f"{surface} doublet", f"{rate_hz}", *_worst(response_agreement(surface, rate_hz)))
         for surface in ("aileron", "elevator")
         for rate_hz in RESPONSE_BAR
     ]

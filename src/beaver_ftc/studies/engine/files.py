@@ -75,9 +75,8 @@ def locked(folder: Path) -> Iterator[None]:
         lock.release()
 
 
-def set_aside(path: Path, why: str) -> Path:
-    """Rename a damaged file, so that its content is not lost, and print one line with the reason `why`.
-    Returns the new path."""
+def set_aside(path: Path, why: str) -> None:
+    """Rename a damaged file, so that its content is not lost, and print one line with the reason `why`."""
     name = f"{path.name}{DAMAGED}"
     n = 1
     while (path.parent / name).exists():
@@ -85,4 +84,3 @@ def set_aside(path: Path, why: str) -> Path:
         name = f"{path.name}{DAMAGED}-{n}"
     path.rename(path.parent / name)
     say_once(f"{path}: {why}: set aside as {name}; what was in it is flown again")
-    return path.parent / name

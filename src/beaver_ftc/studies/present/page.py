@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.documents.files import Document
@@ -21,10 +21,6 @@ from beaver_ftc.studies.present.tables import (
     markdown_table,
     tabulated,
 )
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 
 Drawn = Mapping[str, Path]
 """Files of pictures, by the stems of their names."""
@@ -238,10 +234,4 @@ def _write(path: Path, content: Content) -> None:
     elif isinstance(content, Callable):  # type: ignore[arg-type]
         _write(path, content(path.parent))
     elif content is not None:
-        save(content, path)
-
-
-def save(figure: "Figure", path: Path) -> Path:
-    """Write a figure as PNG; the same figure gives the same bytes."""
-    figure.savefig(path, metadata={"Software": SOFTWARE_MARK})
-    return path
+        content.savefig(path, metadata={"Software": SOFTWARE_MARK})  # the same figure gives the same bytes

@@ -23,7 +23,7 @@ from beaver_ftc.studies.present.figures import (
     marker,
     panels,
 )
-from beaver_ftc.studies.present.page import save
+from beaver_ftc.studies.present.page import write_files
 from beaver_ftc.studies.present.tables import values_of
 from beaver_ftc.studies.sweep.key_words import in_words
 from beaver_ftc.studies.sweep.outcomes import Flights
@@ -41,13 +41,11 @@ _SEARCHED = {  # label of the score, by objective of the search
 }
 
 
-def write_figures(flights: Flights, summary: Document, folder: Path) -> list[Path]:
-    """Draw each figure with data as `<name>.png`, and remove older ones; return the files."""
-    folder.mkdir(exist_ok=True)
+def write_figures(flights: Flights, summary: Document, folder: Path) -> None:
+    """Draw each figure with data as `<name>.png`, and remove older ones."""
     for name in FIGURES:
         (folder / f"{name}.png").unlink(missing_ok=True)
-    drawn = [(name, draw(flights, summary)) for name, (_, draw) in FIGURES.items()]
-    return [save(figure, folder / f"{name}.png") for name, figure in drawn if figure is not None]
+    write_files(folder, {f"{name}.png": draw(flights, summary) for name, (_, draw) in FIGURES.items()})
 
 
 def _axes(

@@ -13,7 +13,7 @@ import numpy as np
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.results import SERIES_COLOURS as SERIES
 from beaver_ftc.results import Document, as_json, result_folder
-from beaver_ftc.studies.present import GRID, panels
+from beaver_ftc.studies.present import GRID, panels, write_files
 from beaver_ftc_logs.findings import MAX_BRIEF_EVENT_S, MIN_CREDIBLE_SHARE, duration_text, events_to_show
 from beaver_ftc_logs.log_rows import LogRows
 from beaver_ftc_logs.model import Model
@@ -178,9 +178,7 @@ def write_results(
 
     with result_folder(parent, name) as folder:
         parquet.write_table(pa.table(table), folder / "diagnosis.parquet")
-        (folder / "verdict.json").write_text(as_json(verdict), encoding="utf-8")
-        if page is not None:
-            (folder / "report.html").write_text(page, encoding="utf-8")
+        write_files(folder, {"verdict.json": as_json(verdict), "report.html": page})
         if extra is not None:
             extra(folder)
     return parent / name

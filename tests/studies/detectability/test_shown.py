@@ -4,7 +4,7 @@ import pytest
 
 from beaver_ftc.commands import Reporter
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.studies.detectability import in_trim, places_shown, sizes_shown
+from beaver_ftc.studies.detectability import places_shown, sizes_shown
 from beaver_ftc.studies.detectability.command import Detectability
 from beaver_ftc.studies.present.page import Table, as_text
 
@@ -117,16 +117,3 @@ def test_a_line_spans_the_places_where_some_loss_is_certain():
 def test_methods_exclude_each_other(keys, says):
     with pytest.raises(BadInput, match=f"detectability: allowed: .*{says}"):
         Detectability(**keys).run(Reporter())
-
-
-def test_what_is_said_of_failures_of_engines():
-    rows = [
-        {"engine": "left", "turns_rad_s2": [0.011, 0.032, 0.25], "shows": 41.0, "known": True, "held": True},
-        {"engine": "right", "turns_rad_s2": [0.52, 0.0, 0.1], "shows": 0.3, "known": False, "held": False},
-    ]
-    assert in_trim.failures_in_words(rows) == [
-        "left failed to idle accelerates the aircraft by 0.25 rad/s2, 41 times the detection limit of one "
-        "frame; the design model knows its moment and monitors it against the thrust",
-        "right failed to idle accelerates the aircraft by 0.52 rad/s2, 0.3 times the detection limit of one "
-        "frame",
-    ]

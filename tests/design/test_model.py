@@ -4,10 +4,7 @@ import csv
 from pathlib import Path
 
 import numpy as np
-import pytest
 
-from beaver_ftc.aircraft.schema import MAX_MONOMIALS
-from beaver_ftc.design import model
 from beaver_ftc.design.engine import engine_power_kw, slipstream
 from beaver_ftc.design.model import design_record, nonlinear_response
 
@@ -52,30 +49,3 @@ def test_it_gives_the_angular_accelerations_of_fdc():
         theirs.append([row["pdot_rad_s2"], row["qdot_rad_s2"], row["rdot_rad_s2"]])
     error = np.sqrt(np.mean((np.array(ours) - theirs) ** 2, axis=0))
     assert np.all(error <= 2e-5 * np.sqrt(np.mean(np.square(theirs), axis=0)))
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_damping_is_the_derivative_of_the_aerodynamic_moments_with_the_rates(seed):
-    """By differences; what is left without dynamic pressure is the coupling of inertia, not of the air."""
-    design, rng = design_record()[0], np.random.default_rng(seed)
-    x, u = rng.uniform(-0.3, 0.3, 3), rng.uniform(-0.3, 0.3, 4)
-    y = np.array([0.1, 0.05, 45.0, 1000.0, 0.5]) * rng.uniform(0.8, 1.2, 5)
-    still = y * [1, 1, 1, 0, 1]
-
-    def moments(x):
-        f, G = split(design, x, y)
-        return f + G @ u - split(design, x, still)[0]
-
-    found, h = np.zeros((3, 3)), 1e-5
-    model.rate_damping(design, x, y, u, np.zeros(MAX_MONOMIALS), found)
-    for j, step in enumerate(h * np.eye(3)):
-        assert found[:, j] == pytest.approx(
-            (moments(x + step) - moments(x - step)) / (2 * h), rel=1e-6, abs=1e-8
-        )
-
-
-def test_the_unanticipated_moment_grows_with_the_cube_of_alpha():
-    """10 alpha^3 qdyn S c / Iy of the Beaver."""
-    y = np.array([0.2, 0.1, 45.0, 1000.0, 0.5])
-    expected = 10.0 * 0.2**3 * 1000.0 * 23.23 * 1.5875 / 6928.93
-    assert model.unanticipated_pitch(design_record()[0], y, 10.0) == pytest.approx(expected, rel=1e-12)

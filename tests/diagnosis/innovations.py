@@ -6,7 +6,6 @@ with w, v, and n over its own standard deviation, independent and standard norma
 """
 
 import numpy as np
-from scipy.linalg import block_diag
 from scipy.signal import lfilter
 
 from beaver_ftc.compiled import copy, kernel
@@ -60,39 +59,6 @@ def drawn(block, frames, dt, rng, start=0.0):
     white = np.sqrt(block["Q_x"][:n]) * rng.standard_normal((frames, n))
     drifts = lfilter([1.0], [1.0, -float(block["a"])], steps, axis=0)
     return drifts + white + np.diff(gyros, axis=0) / dt
-
-
-class PlainKalman:
-    """The textbook filter of 2n states, rates and drifts, on measured rates."""
-
-    def __init__(self, block, dt):
-        n = self.n = int(block["n"])
-        self.F = np.block([[np.eye(n), dt * np.eye(n)], [np.zeros((n, n)), block["a"] * np.eye(n)]])
-        self.H = np.hstack([np.eye(n), np.zeros((n, n))])
-        self.P = block_diag(block["P_xx"][:n, :n], block["P_dd"][:n, :n])
-        self.Q = block_diag(dt**2 * np.diag(block["Q_x"][:n]), dt * block["Q_d"][:n, :n])
-        self.R = np.diag(block["R_y"][:n])
-        self.x = np.zeros(2 * n)
-
-    def step(self, z):
-        """Innovation (n,) of the measured rates z (n,), after a frame; P, S and K are left to look at."""
-        self.x, self.P = self.F @ self.x, self.F @ self.P @ self.F.T + self.Q
-        self.S = self.H @ self.P @ self.H.T + self.R
-        self.K = self.P @ self.H.T @ np.linalg.inv(self.S)
-        innovation = z - self.H @ self.x
-        self.x = self.x + self.K @ innovation
-        rest = np.eye(2 * self.n) - self.K @ self.H
-        self.P = rest @ self.P @ rest.T + self.K @ self.R @ self.K.T
-        return innovation
-
-
-@kernel
-def filter_all(block, innovations, dt, out):
-    """Innovations (k, n) rad/s2 whitened into out (k, 2)."""
-    for k in range(len(innovations)):
-        whitening.advance_covariance(block, dt)
-        copy(innovations[k], block.nu[: block.n])
-        whitening.whiten_step(block, block.state, block.nu, dt, out[k])
 
 
 @kernel

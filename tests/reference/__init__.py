@@ -15,7 +15,12 @@ It depends on no name of the package but its public ones (flights.py), so the pa
     pairs.py         the same with two faults at once                       fault-types.md
     noise.py         drift, variances, unknown constants and their bounds  statistical.md
     gusts.py         gusts that vanes measure, and what they leave          statistical.md
-    statistical.py   whitened innovation, tests, scores, which loss         statistical.md
+    likelihood.py    whitened innovation, tests, scores                     statistical.md
+    directions.py    parity directions of an aircraft                       statistical.md
+    forces.py        side and normal force, integrated flow angles          statistical.md
+    oscillations.py  tests for an oscillation                               statistical.md
+    parity.py        tests in parity directions, their confirmation         statistical.md
+    statistical.py   the alarm, and which fault                             statistical.md
     diagnosis.py     a whole flight, and the residual after the alarm
     monitor.py       tests between instruments, their filters and bounds    instruments.md
 
@@ -25,13 +30,12 @@ to threshold, its test, that the alarm is raised, and that the name is an instru
 
 Not here, and not compared: the weights of the network (its output is read from the log), the names of
 `fault_class: all` with `fault_profile: abrupt` (there the rest of a surface that the law gives up is
-evidence), the statistical detector of `fault_class: all` (parity directions, forces, oscillations), probing,
-damage, turbulence below 200 m, changes of the declaration in flight. Of a fault inside a frame of several
+evidence), probing, damage, changes of the declaration in flight. Of a fault inside a frame of several
 JSBSim steps only abrupt ones are compared.
 
-Of the statistical detector in turbulence not here: aircraft whose design model has no forces (derived ones;
-their coarse estimate, and accelerometers in its place), declared errors of the attitude, deliberate errors of
-force coefficients, and an estimated speed below half the airspeed.
+Of the statistical detector not here: in turbulence, aircraft whose design model has no forces (derived ones;
+their coarse estimate, and accelerometers in its place), and an estimated speed below half the airspeed;
+deliberate errors of force coefficients; accelerometers that may be broken, with `sensor_monitor: always`.
 
 Of the sensor monitor not here, and not compared: the tests 11 and 12 (no plug-in reads the engine's
 instruments) and those of additional sensors, the pause in a steep attitude, exclusion of candidates by other

@@ -24,6 +24,7 @@ GUST_LIMIT_SIGMA = 6.0
 OUTSIDE_RAD_S2 = 1e6  # mu outside the boxes of a derived model
 EDGE = 1e-9  # share by which the boxes are larger, for rounding
 GUST_FT_S = {"none": 0.0, "light": 7.4, "moderate": 10.6, "severe": 23.6}  # MIL-F-8785C, above 2000 ft
+LOW_GUST_FT_S = {"none": 0.0, "light": 2.53, "moderate": 5.06, "severe": 7.6}  # a tenth of the wind at 20 ft
 SCALE_FT, M_PER_FT, ROLLING = 1750.0, 0.3048, 1.9  # Yeager1998, eq. 8
 
 
@@ -35,11 +36,23 @@ def kappa(K: dict[str, float]) -> np.ndarray:
     return np.maximum([roll, pitch, yaw], 1.0)
 
 
-def air_rotation(declaration: Declaration) -> float:
+def gusts_of(declaration: Declaration) -> tuple[float, float]:
+    """sigma_w, m/s: above 2000 ft, where its scale is 1750 ft; below 1000 ft, where it is the height."""
+    severity = declaration["bounds.turbulence"]
+    return M_PER_FT * GUST_FT_S[severity], M_PER_FT * LOW_GUST_FT_S[severity]
+
+
+def least_height(declaration: Declaration, altitude: np.ndarray) -> np.ndarray:
+    """Least height of the aircraft, m: altitude less its error, at least 10 ft."""
+    return np.maximum(altitude - declaration.error("altitude").e(altitude), 10.0 * M_PER_FT)
+
+
+def air_rotation(declaration: Declaration, altitude: np.ndarray) -> np.ndarray:
     """6 standard deviations of the air's rotation about any axis, rad/s: that of the rolling gust,
-    1.9 sigma_w / sqrt(L b) in feet, above 2000 ft. (Near the ground it is larger: not here.)"""
-    sigma = GUST_FT_S[declaration["bounds.turbulence"]]
-    return GUST_LIMIT_SIGMA * ROLLING * sigma / sqrt(SCALE_FT * declaration.aircraft.b / M_PER_FT)
+    1.9 sigma_w / sqrt(L b), above 2000 ft or near the ground, whichever is larger."""
+    (aloft, low), b = gusts_of(declaration), declaration.aircraft.b
+    near = low / np.sqrt(least_height(declaration, altitude) * b)
+    return GUST_LIMIT_SIGMA * ROLLING * np.maximum(aloft / sqrt(SCALE_FT * M_PER_FT * b), near)
 
 
 def gyro_error(declaration: Declaration, x: np.ndarray) -> np.ndarray:
@@ -104,7 +117,9 @@ class Magnitudes:
     moments depend on the rates against the air, which may rotate.
     """
 
-    def __init__(self, declaration: Declaration, model: DesignModel, x: np.ndarray, y: np.ndarray) -> None:
+    def __init__(
+        self, declaration: Declaration, model: DesignModel, x: np.ndarray, y: np.ndarray, altitude: np.ndarray
+    ) -> None:  # fmt: skip
         read = np.concatenate([x, y[:, :4]], axis=1)
         e = np.stack([declaration.error(name).e(read[:, j]) for j, name in enumerate(READINGS)], axis=1)
         self.x, self.x_largest = np.abs(x), np.abs(x) + e[:, :3]
@@ -113,7 +128,7 @@ class Magnitudes:
         if "dpt" in model.aircraft.signals:
             y_largest[:, 4] += slipstream_error(declaration, y)
         y_largest[:, 2] = np.maximum(y[:, 2] - e[:, 5], 0.1 * y[:, 2])
-        against_air = self.x_largest + air_rotation(declaration)
+        against_air = self.x_largest + air_rotation(declaration, altitude)[:, None]
         self.as_read = signals_of(model.aircraft, self.x, y_read)
         self.largest = signals_of(model.aircraft, against_air, y_largest)
         self.qdyn, self.qdyn_largest = y_read[:, 3], y_largest[:, 3]
@@ -138,9 +153,10 @@ class Bounds:
 
     def __init__(
         self, declaration: Declaration, model: DesignModel,
-        x: np.ndarray, y: np.ndarray, u: np.ndarray, du: np.ndarray,
+        x: np.ndarray, y: np.ndarray, u: np.ndarray, du: np.ndarray, altitude: np.ndarray,
     ) -> None:  # fmt: skip
-        self.declaration, self.model, self.sizes = declaration, model, Magnitudes(declaration, model, x, y)
+        self.declaration, self.model = declaration, model
+        self.altitude, self.sizes = altitude, Magnitudes(declaration, model, x, y, altitude)
         self.tolerance = [declaration.coefficient_share(t.name) * abs(t.value) for t in model.terms]
         self.inertia_error = model.inertia_errors(declaration["bounds.inertia"])
         self.level = self.box = self.row = None

@@ -88,6 +88,12 @@ class AircraftFile:
         """The same of the forces, without those of the rate of sideslip; none where the file has none."""
         return [t for t in self._terms("forces", FORCES) if "betadoth" not in dict(t.powers)]
 
+    @cached_property
+    def by_sideslip_rate(self) -> float:
+        """Side force coefficient by the rate of sideslip times b / 2V."""
+        side = [t for t in self._terms("forces", FORCES) if t.axis == 1]
+        return sum(t.value for t in side if t.powers == (("betadoth", 1),))
+
     def _terms(self, section: str, coefficients: tuple[str, ...]) -> list[Term]:
         of_section = self.file.get(section) or {}
         return [
@@ -229,6 +235,18 @@ class Declaration:
         suffix, si = SUFFIXES[reading]
         sizes = (of_it.get(f"{key}_{suffix}", 0.0) * si for key in ("noise_std", "bias", "quantum"))
         return Error(*sizes, abs(of_it.get("scale_error", 0.0)))
+
+    @property
+    def compares_across(self) -> bool:
+        """Whether evidence along parity directions excludes surfaces."""
+        able = self.statistical and self.all_types and self["authority"] != "worst-case"
+        return able and not self["pairs"] and self.n == 1
+
+    @property
+    def largest_share(self) -> float:
+        """The largest declared relative error of a term."""
+        share = self["bounds.coefficients"]
+        return max(share.values(), default=0.0) if isinstance(share, dict) else float(share)
 
     def coefficient_share(self, name: str) -> float:
         """Declared relative error of a term."""

@@ -10,10 +10,13 @@ import numpy as np
 from reference.bounds import Bounds, gyro_error
 from reference.declaration import AXES, Declaration
 from reference.detection import Bank
+from reference.directions import uses_forces
+from reference.forces import Force
 from reference.isolation import Frame, Isolation
 from reference.naming import UNANTICIPATED, Finding, Naming, Withdrawn
 from reference.noise import Noise
 from reference.pairs import Pairs
+from reference.parity import Rows
 from reference.prediction import DesignModel, Frames, frames_of, mean_of_frames, servo_positions
 from reference.statistical import Statistical
 from reference.types import Loss
@@ -23,7 +26,8 @@ class Readings(NamedTuple):
     """What the diagnosis reads, a row for each instant: JSBSim steps from the first frame on, n_s a frame.
 
     x (instants, 3) rad/s; y (instants, 4 + signals): alpha, beta, V, qdyn, signals; attitude (instants, 3)
-    rad: bank, pitch, heading; command (instants, surfaces) rad: the one that acts at the end of each step.
+    rad: bank, pitch, heading; force (instants, 3) m/s2, of accelerometers;
+    altitude (instants,) m; command (instants, surfaces) rad: the one that acts at the end of each step.
     After the alarm also, a row for each frame, what the law takes for known: network (frames, 3) rad/s2 and
     effectiveness (frames, surfaces).
     trim: x, y, u at the start of the flight.
@@ -32,6 +36,8 @@ class Readings(NamedTuple):
     x: np.ndarray
     y: np.ndarray
     attitude: np.ndarray
+    force: np.ndarray
+    altitude: np.ndarray
     command: np.ndarray
     network: np.ndarray
     effectiveness: np.ndarray
@@ -77,7 +83,7 @@ def diagnose(declaration: Declaration, readings: Readings) -> Result:
     u, du = servo_positions(declaration, readings.command, readings.command[0])
     G = model.G(y)
     frames = frames_of(declaration, model.f(x, y), G, u)
-    bounds = Bounds(declaration, model, x, y, u, du)
+    bounds = Bounds(declaration, model, x, y, u, du, readings.altitude)
     at_frames = x[::n]
     nu = np.concatenate([np.full((1, 3), np.nan), np.diff(at_frames, axis=0) / declaration.dt - frames.F[1:]])
     eta_bar, changing = mean_of_frames(n, bounds.now), gyro_error(declaration, at_frames)
@@ -88,8 +94,11 @@ def diagnose(declaration: Declaration, readings: Readings) -> Result:
         bank.E[:, 0] = approximation_residual(declaration, bank, 0, flight, readings)
     detector = None
     if declaration.statistical:
-        noise = Noise(declaration, bounds, readings.attitude, readings.trim)
-        detector = Statistical(declaration, noise, frames)
+        noise = Noise(declaration, bounds, readings.attitude, readings.force, readings.trim)
+        number = 2 if uses_forces(declaration) else 0
+        forces = [Force(noise, i, readings.attitude, readings.force) for i in range(number)]
+        rows = Rows(noise, frames, forces, nu, readings.attitude, readings.force)
+        detector = Statistical(declaration, noise, frames, rows)
     isolation = Isolation(declaration, bank, frames, bounds, G[0])
     naming = None
     if declaration.all_types:
@@ -190,7 +199,8 @@ class Verdict:
             self.alarm = k, AXES[axis]
             self.isolation.start(frame)
         if self.alarm:
-            self.isolation.exclude(of, frame, started, self.by_worst_case, self.by_likelihood)
+            worst_case = self.by_worst_case or self.declaration.all_types
+            self.isolation.exclude(of, frame, started, worst_case, self.by_likelihood)
             if self.naming:
                 name = self.naming.take(frame, of, started or self.isolation.remembers)
             else:
@@ -215,5 +225,5 @@ class Verdict:
             if one.name == named:
                 s = one.surface
                 theta = self.isolation.theta[row, self.declaration.aircraft.main_axis[s]]
-                found[s] += self.by_likelihood.theta(s) if self.by_likelihood else theta
+                found[s] += self.by_likelihood.theta(s) if self.by_likelihood and not self.naming else theta
         return found

@@ -14,6 +14,7 @@ import yaml
 import beaver_ftc as bf
 from reference.declaration import AircraftFile, Declaration
 from reference.diagnosis import Readings
+from reference.directions import uses_forces
 
 FLOW = ("alpha_rad", "beta_rad", "airspeed_mps", "qdyn_pa")
 ATTITUDE = ["phi_rad", "theta_rad", "psi_rad"]
@@ -36,15 +37,26 @@ def read(document: dict[str, Any], log: Any, declaration: Declaration) -> Readin
     command = log[[f"{s}_cmd_rad" for s in aircraft.surfaces]].to_numpy()
     network = log[[f"{axis}_network_rad_s2" for axis in "pqr"]].to_numpy()
     effectiveness = log[[f"{s}_effectiveness_used" for s in aircraft.surfaces]].to_numpy()
-    if n == 1 and document.get("sensors", "ideal") == "ideal":
+    if n == 1 and document.get("sensors", "ideal") == "ideal" and not uses_forces(declaration):
         y, attitude = log[[*FLOW, *aircraft.signals]].to_numpy(), log[ATTITUDE].to_numpy()
-        return Readings(x, y, attitude, command, network, effectiveness, (x[0], y[0], command[0]))
+        return Readings(
+            x,
+            y,
+            attitude,
+            0.0 * x,
+            log["altitude_m"].to_numpy(),
+            command,
+            network,
+            effectiveness,
+            (x[0], y[0], command[0]),
+        )
     seen, at_each_step = _seen(document, command, n)
     frames = min(len(x), (len(seen.measured) - 1) // n + 1)  # an aircraft may be lost inside the last frame
     steps = (frames - 1) * n + 1
     commands = np.concatenate([command[:1], at_each_step])[:steps]
     of_steps = (
-        np.array([getattr(one, name) for one in seen.measured[:steps]]) for name in ("x", "y", "attitude")
+        np.array([getattr(one, name) for one in seen.measured[:steps]])
+        for name in ("x", "y", "attitude", "force", "altitude_m")
     )
     found = Readings(*of_steps, commands, network, effectiveness, seen.trim)
     assert np.array_equal(found.x[::n], x[:frames]), "the second flight is another one"

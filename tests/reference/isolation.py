@@ -320,9 +320,9 @@ class Isolation:
                 excluded[row] = not self.narrow(row, of, frame)
         for row in range(len(self.of)):
             out = excluded[row] and by_worst_case
-            if not out and detector and detector.alarmed:
+            if not out and detector:
                 gone = {self.surface[j] for j in np.flatnonzero(self.excluded)}
-                out = detector.excludes(self.surface[row], gone)
+                out = detector.excludes(frame.k, self.surface[row], gone)
             if out and not self.excluded[row]:
                 self.excluded[row], self.excluded_at[row] = True, frame.t
 

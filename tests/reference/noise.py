@@ -14,30 +14,26 @@ from reference.bounds import (
     KW_TO_DPT,
     SEA_LEVEL_KG_M3,
     Bounds,
+    gusts_of,
     power_errors,
     published_bound,
 )
 from reference.declaration import NOISE_LIMIT_SIGMA, Declaration
-from reference.gusts import Gusts
+from reference.directions import ONSETS, directions_of, uses_forces
+from reference.gusts import Gusts, L
 from reference.prediction import powers, signals_of
 
-ONSETS = 10
 EXACT_GYRO_RAD_S, LEAST_BOUND_RAD_S2, MOST_MAPPED_RAD_S2 = 1e-9, 1e-3, 100.0
 FULL_CHANGE_SHARE_OF_TRAVEL = 0.25  # a derived model's error goes from one end of its bound to the other
 AIR_DATA = ("alpha", "beta", "V", "qdyn")
 
 
-def tests_of(declaration: Declaration) -> int:
-    """Tests in a frame: pitch once, roll and yaw twice; a loss has one sign, a step two; at each onset."""
+def tests_of_groups(declaration: Declaration) -> int:
+    """Tests of the groups in a frame: pitch once, roll and yaw twice; a loss has one sign, a step two; at
+    each onset."""
     pitch = [declaration.aircraft.main_axis[one.surface] == 1 for one in declaration.losses]
     lateral = len(pitch) - sum(pitch)
     return ONSETS * ((sum(pitch) + 2) + 2 * (lateral + 4))
-
-
-def alarm_level(declaration: Declaration, tests: int) -> float:
-    """z = -probit(false_alarms_per_h / (3600 rate_hz tests))."""
-    per_frame = declaration["statistical.false_alarms_per_h"] * declaration.dt / 3600.0
-    return -NormalDist().inv_cdf(per_frame / tests)
 
 
 def drift_power(eta_bar: float, omega: float, sigma: float, z: float, dt: float) -> float:
@@ -60,12 +56,15 @@ class Noise:
     """What is not a fault: drift, variance of f + G u, bounded error, unknown constants; of one flight."""
 
     def __init__(
-        self, declaration: Declaration, bounds: Bounds, attitude: np.ndarray, trim: tuple[np.ndarray, ...]
+        self, declaration: Declaration, bounds: Bounds, attitude: np.ndarray, force: np.ndarray,
+        trim: tuple[np.ndarray, ...],
     ) -> None:  # fmt: skip
         self.declaration, self.model, self.bounds, self.trim = declaration, bounds.model, bounds, trim
         self.x, self.y, self.u = bounds.x, bounds.y, bounds.u
-        self.tests = tests_of(declaration)
-        z = self.z = alarm_level(declaration, self.tests)
+        self.parity_directions = directions_of(declaration)
+        tests = tests_of_groups(declaration) + sum(one.tests for one in self.parity_directions)
+        self.false_alarm = declaration["statistical.false_alarms_per_h"] * declaration.dt / 3600.0 / tests
+        z = self.z = -NormalDist().inv_cdf(self.false_alarm)
         self.exact = np.array([declaration.error(gyro).random for gyro in "pqr"])
         self.gyro = np.maximum(self.exact, EXACT_GYRO_RAD_S)
         self.omega = declaration["statistical.uncertainty_rad_s"]
@@ -75,7 +74,7 @@ class Noise:
         self.length = trim[1][2] * sqrt(2.0 * window / self.intensity) / z  # m, of the drift that returns
         self.gusts = None
         if declaration["bounds.turbulence"] != "none":
-            self.gusts = Gusts(self, attitude)
+            self.gusts = Gusts(self, attitude, force if uses_forces(declaration) else None)
             self.length = self.gusts.length
         self.eta_bar = self._bounded()
         self.change = self._change()
@@ -103,33 +102,37 @@ class Noise:
         return np.minimum(share + 2.0 / FULL_CHANGE_SHARE_OF_TRAVEL * moved.max(axis=1), 2.0)
 
     def _slopes(self) -> np.ndarray:
-        """(instants, 5, 3): change of f + G u by one unit of alpha, beta, V, qdyn, and engine power in kW.
-
-        dpt follows from the last three if errors of the engine's instruments are declared, with
-        r = 191.18 / (qdyn V) times the error of the power for the whole density times rho / 1.225:
-
-            d dpt / d V = (2 r - (dpt - 0.08696)) / V,   d dpt / d qdyn = -(r + dpt - 0.08696) / qdyn
-        """
-        directions = np.zeros((5, *self.y.shape))
-        for j in range(4):
-            directions[j, :, j] = 1.0
-        given = power_errors(self.declaration)
-        if given:
-            V, qdyn, dpt = self.y[:, 2], self.y[:, 3], self.y[:, 4]
-            per_kw = KW_TO_DPT / (qdyn * V)
-            r = per_kw * given[1] * 2.0 * qdyn / V**2 / SEA_LEVEL_KG_M3
-            directions[2, :, 4] = (2.0 * r - (dpt - DPT_0)) / V
-            directions[3, :, 4] = -(r + dpt - DPT_0) / qdyn
-            directions[4, :, 4] = per_kw
+        """(instants, 5, 3): change of f + G u by one unit of each reading, by complex steps."""
         step = 1e-30
         found = []
-        for direction in directions:
+        for direction in self.directions(self.y):
             y = self.y + 1j * step * direction
             moved = (
                 self.model.nonlinear_f(self.x, y) + (self.model.nonlinear_G(y) @ self.u[..., None])[..., 0]
             )
             found.append(moved.imag / step)
         return np.stack(found, axis=1)
+
+    def directions(self, y: np.ndarray) -> np.ndarray:
+        """(5, *y.shape): change of y by one unit of alpha, beta, V, qdyn, and engine power in kW.
+
+        dpt follows from the last three if errors of the engine's instruments are declared, with
+        r = 191.18 / (qdyn V) times the error of the power for the whole density times rho / 1.225:
+
+            d dpt / d V = (2 r - (dpt - 0.08696)) / V,   d dpt / d qdyn = -(r + dpt - 0.08696) / qdyn
+        """
+        directions = np.zeros((5, *y.shape))
+        for j in range(4):
+            directions[j, ..., j] = 1.0
+        given = power_errors(self.declaration)
+        if given:
+            V, qdyn, dpt = y[..., 2], y[..., 3], y[..., 4]
+            per_kw = KW_TO_DPT / (qdyn * V)
+            r = per_kw * given[1] * 2.0 * qdyn / V**2 / SEA_LEVEL_KG_M3
+            directions[2, ..., 4] = (2.0 * r - (dpt - DPT_0)) / V
+            directions[3, ..., 4] = -(r + dpt - DPT_0) / qdyn
+            directions[4, ..., 4] = per_kw
+        return directions
 
     @property
     def reading_sigma(self) -> np.ndarray:
@@ -184,11 +187,16 @@ class Noise:
             found.append(tolerance)
         return np.array(found)
 
-    def known(self, k: int, terms: list[int], axes: list[int]) -> np.ndarray:
-        """(constants, axes): regressors of the frame that ends at k, means over it: terms, then readings."""
+    def known(self, k: int, terms: list[int]) -> np.ndarray:
+        """(constants, 3): regressors of the frame that ends at k, means over it: terms, then readings."""
         of_it = slice((k - 1) * self.declaration.n, k * self.declaration.n)
         both = self.coefficients[of_it][:, terms], self.slopes[of_it]
-        return np.concatenate(both, axis=1).mean(axis=0)[:, axes]
+        return np.concatenate(both, axis=1).mean(axis=0)
+
+    @property
+    def angle_walk(self) -> float:
+        """3 sigma^2 / (L V), V in trim: intensity of the walk of a flow angle by gusts, rad2/s."""
+        return float(3.0 * gusts_of(self.declaration)[0] ** 2 / (L * self.trim[1][2]))
 
     @property
     def steady(self) -> np.ndarray:

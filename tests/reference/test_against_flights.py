@@ -15,7 +15,8 @@ FLIGHTS = (
     samples(1000),
     samples(480),
     samples(240),
-)  # by day one covering array of 120, most of one of faults of all types, a part of one in gusts
+    samples(400),
+)  # by day one covering array of 120, most of one of faults of all types, a part of one in gusts, of parity
 DERIVES = "derive" in entries(SERVICES)  # without, no aircraft of the jsbsim package flies
 
 
@@ -43,3 +44,8 @@ def test_types_and_candidates_are_those_of_the_page(part):
 @pytest.mark.parametrize("part", range(PARTS))
 def test_the_statistical_detector_in_gusts_is_that_of_the_page(part):
     assert differing(drawn(2)[part::PARTS]) == []
+
+
+@pytest.mark.parametrize("part", range(PARTS))
+def test_parity_directions_are_those_of_the_page(part):
+    assert differing(drawn(3)[part::PARTS]) == []

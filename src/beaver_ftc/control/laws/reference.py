@@ -46,9 +46,9 @@ def discretise(wn: float, zeta: float, dt: float) -> tuple[np.ndarray, np.ndarra
     """State transition A (2, 2) and input B (2,) of (xm, xm') over dt (s) under a held reference; wn in
     rad/s.
 
-    Cayley-Hamilton for a 2 x 2 matrix: exp(F dt) = e^{-s dt} (c I + d (F + s I)) with s = zeta wn, and c, d
-    the (hyperbolic) cosine and sine of m dt, m^2 = s^2 - wn^2. The input follows from the equilibrium (ref,
-    0).
+    Cayley-Hamilton for a 2 x 2 matrix: exp(F dt) = e^{-s dt} (c I + d (F + s I)) with s = zeta wn,
+    c = cosh(m dt), d = sinh(m dt) / m in s, and m^2 = s^2 - wn^2. The input follows from the equilibrium
+    (ref, 0).
     """
     s = zeta * wn
     m = np.sqrt(complex(s * s - wn * wn))

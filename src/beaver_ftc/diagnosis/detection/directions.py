@@ -9,6 +9,8 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel
 
+ROUNDING_SHARE = 1e-9  # of the size of a projection, below which it is rounding
+
 
 @kernel
 def project(m, v):
@@ -26,6 +28,16 @@ def project_size(m, size):
     for j in range(m.size):
         total += abs(m[j]) * size[j]
     return total
+
+
+@kernel
+def project_beyond_rounding(m, v):
+    """m' v; 0 if v is orthogonal to m but for rounding: |m' v| <= ROUNDING_SHARE |m|' |v|."""
+    total = size = 0.0
+    for j in range(m.size):
+        total += m[j] * v[j]
+        size += abs(m[j] * v[j])
+    return total if abs(total) > ROUNDING_SHARE * size else 0.0
 
 
 @kernel

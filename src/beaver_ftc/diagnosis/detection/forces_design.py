@@ -6,6 +6,8 @@ e           innovation of a force, rad/s2; per_C: e of a coefficient of one
 std         standard deviation of the noise of a reading
 """
 
+from typing import Any
+
 import numpy as np
 
 from beaver_ftc.aircraft import AXES, ROLL
@@ -165,8 +167,8 @@ def _configure_vane(rows: np.void, f: np.void, slopes: np.ndarray, i: int) -> No
     rows["e_G"][MAX_SURFACES + i] = VANE_TOLERANCE * np.abs(G)
 
 
-def _force_coefficient(declared: Declared, name: str, state: TrimState) -> float:
-    """The force coefficient `name` at x (3,) rad/s, y, u rad."""
+def _force_coefficient(declared: Declared, name: str, state: TrimState) -> Any:
+    """The force coefficient `name` at x (3,) rad/s, y, u rad; x and y may be complex."""
     x, y, u = state
     aircraft = declared.aircraft
     geometry = aircraft.geometry
@@ -174,16 +176,15 @@ def _force_coefficient(declared: Declared, name: str, state: TrimState) -> float
     rates = x * (geometry.span_m / (2.0 * V), geometry.chord_m / V, geometry.span_m / (2.0 * V))
     names = (*aircraft.surfaces, *aircraft.signals, "alpha", "beta", "ph", "qh", "rh", SIDESLIP_RATE)
     values = dict(zip(names, (*u, *y[4:], *y[:2], *rates, 0.0), strict=True))
-    return float(aircraft.coefficient(name, values, declared.scale))
+    return aircraft.coefficient(name, values, declared.scale)
 
 
 def _force_slopes(declared: Declared, name: str, trim: TrimState) -> np.ndarray:
     """(7,): the derivatives of coefficient `name` with alpha, beta (1/rad), airspeed (s/m), rates (s/rad) and
-    dpt, by differences."""
+    dpt, by complex steps."""
     x, y, u = trim
-    step = 1e-5
+    step = 1e-30j
     states = [(x, y + step * e, u) for e in np.eye(3, y.size)]
     states += [(x + step * e, y, u) for e in np.eye(3)]
     states += [(x, y + step * (np.arange(y.size) == DPT), u)]
-    C = _force_coefficient(declared, name, trim)
-    return np.array([(_force_coefficient(declared, name, state) - C) / step for state in states])
+    return np.array([(_force_coefficient(declared, name, state) / step).real for state in states])

@@ -37,7 +37,7 @@ from beaver_ftc.aircraft import PITCH
 from beaver_ftc.aircraft.schema import MAX_SURFACES, MAX_TERMS, MAX_TERMS_OF_ONE
 from beaver_ftc.compiled import kernel, record
 from beaver_ftc.diagnosis.detection.blocks import ALPHA_CUBED_MOMENT, N_ROWS
-from beaver_ftc.diagnosis.detection.directions import project, project_size
+from beaver_ftc.diagnosis.detection.directions import project, project_beyond_rounding, project_size
 
 # Sources, that is, what is subtracted from the innovation of the rates:
 #     RAW         nothing
@@ -80,8 +80,8 @@ def project_rows(b, rows):
         nu = m' nu,  Q_x = (|m|' std)^2,  eta = |m|' eta,  R_y = m^2' R,  signature = m' Gu_s,
         regressor_j = m' Z_j
 
-    The signature of a moment in alpha^3 is m per_cubed in pitch. Other hypotheses without a surface keep
-    their signature.
+    A signature that is rounding alone is 0. The signature of a moment in alpha^3 is m per_cubed in pitch.
+    Other hypotheses without a surface keep their signature.
     """
     for i in range(b.n):
         m = b.m[i]
@@ -93,7 +93,7 @@ def project_rows(b, rows):
             b.R_y[i] += m[r] * m[r] * rows.R[r]
         for h in b.hypothesis[: b.n_h]:
             if h.surface >= 0:
-                h.signature[i] = project(m, rows.Gu[h.surface])
+                h.signature[i] = project_beyond_rounding(m, rows.Gu[h.surface])
             elif h.kind == ALPHA_CUBED_MOMENT:
                 h.signature[i] = m[PITCH] * rows.per_cubed
         for j in range(b.n_columns):

@@ -24,7 +24,7 @@ def enac(real_flights):
     return vehicle, load_flights_for_fit([real_flights / "enac" / "flight-21.csv"], vehicle)[0]
 
 
-@pytest.mark.parametrize("fold", [0, 1], ids=["second", "first"])
+@pytest.mark.parametrize("fold", [0, 1])
 def test_half_of_a_flying_wing_by_the_other(enac, fold):
     vehicle, samples = enac
     usable_flights = fit_parts([samples])

@@ -9,7 +9,7 @@ import numpy as np
 from reference.bounds import OMEGA_E
 from reference.directions import INERTIAL, SIDE_FORCE
 from reference.noise import Noise
-from reference.prediction import powers, signals_of
+from reference.prediction import powers, signals_of, slopes
 
 Array = np.ndarray
 GRAVITY, EARTH_M_S2, LAG_S, MASS_SHARE = 9.80665, 0.03, 0.002, 0.05
@@ -56,7 +56,7 @@ class Force:
         self.noise, self.i, self.declaration, self.model = noise, i, noise.declaration, noise.model
         self.row, self.own = SIDE_FORCE + i, self.declaration.error(INSTRUMENTS[i])
         y, y0, dt, chord, vane = noise.y, noise.trim[1], noise.declaration.dt, self.model.aircraft.c, VANE[i]
-        of_x, of_y = self.slopes()
+        of_x, of_y = (self.per_coefficient(y0) * of for of in slopes(self.coefficient, *noise.trim[:2]))
         self.L, self.of_vane, self.q = of_x, -of_y[vane], y[:, 3] / y0[3]
         rate = flow_rates(noise.x, y, attitude, force)[i]
         f_hat, per_radian = self.predict(np.concatenate([rate[:1], rate[:-1]]))
@@ -77,17 +77,10 @@ class Force:
         walk = (CHANGE_PER_S * drift) ** 2 + dt * (own.random / y0[2]) ** 2 + noise.angle_walk
         self.Q_e = self.of_vane**2 * walk
 
-    def slopes(self) -> tuple[Array, Array]:
-        """Slopes with the rates (3,) and with y (signals,) in trim at its pressure, by complex steps."""
-        (x, y, u), step = self.noise.trim, 1e-30
-
-        def along(dx: Array, dy: Array) -> float:
-            at = x + 1j * step * dx, y + 1j * step * dy
-            C = self.model.coefficients(self.model.aircraft.forces, *at)[1 + self.i]
-            return float((C[-1] + C[:-1] @ u).imag) / step * self.per_coefficient(y)
-
-        of_x = [along(e, np.zeros(y.size)) for e in np.eye(3)]
-        return np.array(of_x), np.array([along(np.zeros(3), e) for e in np.eye(y.size)])
+    def coefficient(self, x: Array, y: Array) -> Array:
+        """C, with the surfaces as in trim."""
+        C = self.model.coefficients(self.model.aircraft.forces, x, y)[1 + self.i]
+        return C[-1] + C[:-1] @ self.noise.trim[2]
 
     def per_coefficient(self, y: Array) -> Array:
         """qdyn S / (m c)."""

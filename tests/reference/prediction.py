@@ -5,8 +5,9 @@
 Arrays have one row for each instant (a JSBSim step), the last axis is that of the components.
 """
 
+from collections.abc import Callable
 from itertools import product
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -50,6 +51,13 @@ def signals_of(aircraft: AircraftFile, x: np.ndarray, y: np.ndarray) -> dict[str
     return found | {name: y[..., 4 + j] for j, name in enumerate(aircraft.signals)}
 
 
+def slopes(of: Callable[..., Any], x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """d of(x, y) / dx (..., 3) and / dy (..., signals), by complex steps."""
+    dx, dy = np.hsplit(1e-30j * np.eye(3 + y.size), [3])
+    along = np.array([of(x + dx_j, y + dy_j) for dx_j, dy_j in zip(dx, dy, strict=True)]).imag.T / 1e-30
+    return along[..., :3], along[..., 3:]
+
+
 class DesignModel:
     """f and G of the aircraft's file, with the designer's deliberate errors (`design_model`)."""
 
@@ -80,16 +88,8 @@ class DesignModel:
         self.f_x, self.f_y = self.derivatives(x0, y0, u0)
 
     def derivatives(self, x: np.ndarray, y: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """d(f + G u) / dx (3, 3) and / dy (3, signals), by complex steps."""
-        step = 1e-30
-
-        def along(dx: np.ndarray, dy: np.ndarray) -> np.ndarray:
-            at = x + 1j * step * dx, y + 1j * step * dy
-            return (self.nonlinear_f(*at) + self.nonlinear_G(at[1]) @ u).imag / step
-
-        none_x, none_y = np.zeros(3), np.zeros(y.size)
-        f_x, f_y = [along(e, none_y) for e in np.eye(3)], [along(none_x, e) for e in np.eye(y.size)]
-        return np.array(f_x).T, np.array(f_y).T
+        """d(f + G u) / dx (3, 3) and / dy (3, signals)."""
+        return slopes(lambda x, y: self.nonlinear_f(x, y) + self.nonlinear_G(y) @ u, x, y)
 
     @property
     def per_moment(self) -> np.ndarray:

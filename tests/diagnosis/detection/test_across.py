@@ -2,9 +2,17 @@
 
 import pytest
 
-from beaver_ftc.loop.loop import fly
+from beaver_ftc.loop.loop import Loop, fly
 from beaver_ftc.studies.matrix.fault_matrix import declared_errors
 from flying import SINES, scenario
+
+
+def test_in_moving_air_no_view_of_pitch_tries_what_answers_the_gusts():
+    """A law that goes by the vanes moves the elevator before the gyros feel a gust."""
+    loop = Loop(scenario(duration_s=1, **declared_errors("light")))
+    views = loop.frames["fdi"]["statistical"]["views"][0]
+    assert [int(view["block"]["n_h"]) for view in views[:5]] == [1, 3, 3, 2, 2]
+    loop.release()
 
 
 def test_a_rudder_that_floats_in_a_gust_stays_a_candidate():
